@@ -1,0 +1,9 @@
+//! Geometry that several stages share: frames, boxes, planar polygons.
+pub mod bounds;
+pub mod frame;
+pub mod polygon;
+pub mod triangle;
+
+pub use bounds::Bounds;
+pub use frame::Frame;
+pub use polygon::Ring;

@@ -1,0 +1,13 @@
+//! cobake bakes lightmaps: glTF in, glTF with EXR lightmaps out.
+pub mod error;
+pub mod export;
+pub mod geom;
+pub mod light;
+pub mod options;
+pub mod progress;
+pub mod raster;
+pub mod retriangulate;
+pub mod scene;
+pub mod surface;
+pub mod trace;
+pub mod unwrap;

@@ -1,0 +1,217 @@
+//! What a bake can be told. The command line uses the same words.
+
+use serde::Serialize;
+
+/// Which elements are split when a shooter's light arrives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Refine {
+    /// A priori: where an occluder stands close above the element (Telea and van Overveld 1998).
+    Cob,
+    /// A posteriori: where a new vertex differs from the interpolation of its parent's.
+    Gradient,
+    /// Both of the above.
+    #[default]
+    #[serde(rename = "cob+gradient")]
+    CobGradient,
+    /// Every element down to the threshold: the baseline to compare with.
+    Uniform,
+    /// No splits: the initial patches receive.
+    None,
+}
+
+/// Where the direct light in a texel comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Direct {
+    /// Interpolated from the mesh's vertices, as the indirect light is.
+    Mesh,
+    /// Evaluated anew in every texel: closed form times visibility.
+    #[default]
+    Texel,
+}
+
+/// What the output's geometry is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Topology {
+    /// The input's own triangles with a second set of texture coordinates.
+    #[default]
+    Source,
+    /// The retriangulated elements, with radiosity as a vertex attribute too.
+    Adaptive,
+}
+
+/// What a texel holds. `E` is irradiance, `L` emission, `ρ` reflectance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Quantity {
+    /// `E`: what three.js and `MOZ_lightmap` expect.
+    #[default]
+    Irradiance,
+    /// `E / π`: what Bevy, Godot, PlayCanvas and Unity expect.
+    Radiance,
+    /// `B = π L + ρ E`: the light that leaves the surface.
+    Radiosity,
+}
+
+/// How fine the lightmap is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Resolution {
+    /// The page's side in texels, `[16, 16384]`; the density follows.
+    Size(u32),
+    /// Texels per metre of surface, above 0; the page's side follows.
+    TexelsPerMetre(f64),
+}
+
+impl Default for Resolution {
+    fn default() -> Self {
+        Self::Size(512)
+    }
+}
+
+/// The height of the prism above an element in which occluders count as close.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum CobHeight {
+    /// A fraction of the element's size, above 0.
+    OfElement(f64),
+    /// A fixed length in metres, above 0. The paper suggests 3 % of the environment's size.
+    Metres(f64),
+}
+
+impl Default for CobHeight {
+    fn default() -> Self {
+        Self::OfElement(1.0)
+    }
+}
+
+/// Everything that [`bake`](crate::bake()) can be told.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct BakeOptions {
+    /// How fine the lightmap is. Default: a page of 512 texels a side.
+    pub resolution: Resolution,
+    /// Worker threads; `0` takes one per core. The result does not depend on it. Default: `0`.
+    pub threads: usize,
+    /// Which elements are split. Default: [`Refine::CobGradient`].
+    pub refine: Refine,
+    /// Where a texel's direct light comes from. Default: [`Direct::Texel`].
+    pub direct: Direct,
+    /// The output's geometry. Default: [`Topology::Source`].
+    pub topology: Topology,
+    /// What a texel holds. Default: [`Quantity::Irradiance`].
+    pub quantity: Quantity,
+    /// Height of the Close Objects Buffer's prism. Default: the element's size.
+    pub cob_height: CobHeight,
+    /// Elements no larger than this are not split, metres, above 0. Default: what the lightmap can show.
+    pub subdivision_threshold: Option<f64>,
+    /// A shot whose estimate `M` (eq. 1) is below this fraction of the receiver's present radiosity
+    /// does not split it, `(0, 1]`. Default: 0.3.
+    pub illumination_threshold: f64,
+    /// Whether Close Objects Buffer entries outside the shaft to the shooter are ignored. Default: yes.
+    pub shaft_test: Toggle,
+    /// Whether elements wholly in one occluder's umbra are left whole. Default: yes.
+    pub umbra_test: Toggle,
+    /// The solver stops when the unshot power falls below this fraction of the emitted power, `(0, 1)`.
+    /// Default: 0.001.
+    pub unshot_fraction: f64,
+    /// Reflectances are clamped to this, `[0, 1)`: nothing may reflect all light for ever. Default: 0.95.
+    pub max_reflectance: f64,
+    /// Padding around a chart, texels, `[1, 16]`. Default: 4, or less where the page is small.
+    pub padding: Option<u32>,
+    /// Which of the document's scenes to bake. Default: its default scene.
+    pub scene: Option<usize>,
+}
+
+/// A choice between on and off that reads as a word.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Toggle {
+    /// The behaviour is on.
+    #[default]
+    On,
+    /// The behaviour is off.
+    Off,
+}
+
+impl Default for BakeOptions {
+    fn default() -> Self {
+        Self {
+            resolution: Resolution::default(),
+            threads: 0,
+            refine: Refine::default(),
+            direct: Direct::default(),
+            topology: Topology::default(),
+            quantity: Quantity::default(),
+            cob_height: CobHeight::default(),
+            subdivision_threshold: None,
+            illumination_threshold: 0.3,
+            shaft_test: Toggle::On,
+            umbra_test: Toggle::On,
+            unshot_fraction: 1e-3,
+            max_reflectance: 0.95,
+            padding: None,
+            scene: None,
+        }
+    }
+}
+
+/// An option outside its range.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{option} is {value}; it must be {range}")]
+pub struct OptionsError {
+    /// The option's name as on the command line, without dashes.
+    pub option: &'static str,
+    /// The value given.
+    pub value: f64,
+    /// The range in words.
+    pub range: &'static str,
+}
+
+impl BakeOptions {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// Names the first option that is out of its range (NaN is always out).
+    pub fn validate(&self) -> Result<(), OptionsError> {
+        let check = |holds: bool, option, value, range| {
+            if holds { Ok(()) } else { Err(OptionsError { option, value, range }) }
+        };
+        match self.resolution {
+            Resolution::Size(side) => {
+                check((16..=16384).contains(&side), "size", f64::from(side), "between 16 and 16384 texels")?
+            }
+            Resolution::TexelsPerMetre(t) => {
+                check(t.is_finite() && t > 0.0, "texels-per-metre", t, "a number above 0")?
+            }
+        }
+        match self.cob_height {
+            CobHeight::OfElement(h) => {
+                check(h.is_finite() && h > 0.0, "cob-height", h, "a number above 0")?;
+            }
+            CobHeight::Metres(h) => {
+                check(h.is_finite() && h > 0.0, "cob-height-fixed", h, "a number above 0")?;
+            }
+        }
+        if let Some(t) = self.subdivision_threshold {
+            check(t.is_finite() && t > 0.0, "subdivision-threshold", t, "a number above 0")?;
+        }
+        if let Some(p) = self.padding {
+            check((1..=16).contains(&p), "padding", f64::from(p), "between 1 and 16 texels")?;
+        }
+        let m = self.illumination_threshold;
+        check(m > 0.0 && m <= 1.0, "illumination-threshold", m, "above 0 and at most 1")?;
+        let u = self.unshot_fraction;
+        check(u > 0.0 && u < 1.0, "unshot-fraction", u, "above 0 and below 1")?;
+        let r = self.max_reflectance;
+        check((0.0..1.0).contains(&r), "max-reflectance", r, "at least 0 and below 1")
+    }
+}

@@ -1,0 +1,52 @@
+//! Stage 2: coplanar connected triangles of one material become one planar polygon.
+
+use glam::DVec2;
+
+use crate::geom::{Frame, Ring};
+
+/// A maximal connected coplanar group of one placement's triangles.
+///
+/// Its number of elements, and its chart, do not depend on how it was triangulated.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Index into [`Scene::placements`](crate::scene::Scene::placements).
+    pub placement: usize,
+    /// Index into [`Scene::materials`](crate::scene::Scene::materials).
+    pub material: usize,
+    /// The plane; the first axis follows the outline's longest edge.
+    pub frame: Frame,
+    /// The outline and holes, collinear corners removed; plane coordinates, metres.
+    pub rings: Vec<Ring>,
+    /// Its triangles as indices into [`Scene::triangles`](crate::scene::Scene::triangles).
+    pub source_triangles: Vec<usize>,
+    /// The parts into which contact edges cut it; at least one, together the whole.
+    pub regions: Vec<Region>,
+    /// Area, square metres, above 0.
+    pub area: f64,
+    /// Whether the back is a surface like the front (material `doubleSided`).
+    pub double_sided: bool,
+}
+
+/// A part of a surface bounded by its outline and by contact edges: lines on which another
+/// polygon meets or cuts the surface. Radiosity is continuous inside a region and may jump
+/// between regions.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// Outer rings and holes; plane coordinates of the surface's frame.
+    pub rings: Vec<Ring>,
+    /// The same polygon as triangles, counter-clockwise, few of them.
+    pub triangles: Vec<[DVec2; 3]>,
+    /// Area, square metres, above 0.
+    pub area: f64,
+}
+
+impl Surface {
+    /// The least and the greatest corner of the outline, plane coordinates.
+    #[must_use]
+    pub fn extent(&self) -> (DVec2, DVec2) {
+        self.rings
+            .iter()
+            .flatten()
+            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)))
+    }
+}
