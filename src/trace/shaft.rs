@@ -1,0 +1,281 @@
+//! Shafts: the space between a receiver and a shooter.
+//!
+//! The shaft between two convex polygons is their convex hull, held as the planes that
+//! bound it (Haines and Wallace, "Shaft Culling for Efficient Ray-Cast Radiosity", 1991).
+//! What does not reach into it casts no shadow from the one onto the other. Polygons and
+//! points in the shaft's surface do not count as inside: a wall's foot along the edge of
+//! a floor element hides nothing from it.
+
+use glam::DVec3;
+
+use super::Tracer;
+use crate::geom::Bounds;
+
+/// A half-space `normal · x ≥ offset`.
+#[derive(Clone, Copy, Debug)]
+struct HalfSpace {
+    normal: DVec3,
+    offset: f64,
+}
+
+/// The convex hull of a receiver and a shooter, drawn in by a small margin.
+#[derive(Clone, Debug)]
+pub struct Shaft {
+    planes: Vec<HalfSpace>,
+    bounds: Bounds,
+    margin: f64,
+}
+
+impl Shaft {
+    /// The shaft between two convex planar polygons, given by their corners in order.
+    ///
+    /// `shooter` may be a single point. `margin` (metres) is how deep something must reach in to count.
+    #[must_use]
+    pub fn between(receiver: &[DVec3], shooter: &[DVec3], margin: f64) -> Self {
+        let mut planes = Vec::with_capacity(receiver.len() + shooter.len() + 2);
+        let bounds = Bounds::of(receiver.iter().chain(shooter).copied());
+        add_caps(receiver, shooter, margin, &mut planes);
+        add_caps(shooter, receiver, margin, &mut planes);
+        add_sides(receiver, shooter, margin, &mut planes);
+        add_sides(shooter, receiver, margin, &mut planes);
+        Self { planes, bounds, margin }
+    }
+
+    /// Whether a box may reach into the shaft: never wrongly `false`.
+    #[must_use]
+    pub fn may_touch(&self, bounds: Bounds) -> bool {
+        self.bounds.overlaps(bounds)
+            && self.planes.iter().all(|p| {
+                let farthest = DVec3::select(p.normal.cmpge(DVec3::ZERO), bounds.max, bounds.min);
+                p.normal.dot(farthest) > p.offset + self.margin
+            })
+    }
+
+    /// Whether a triangle reaches into the shaft.
+    #[must_use]
+    pub fn touches(&self, triangle: &[DVec3; 3]) -> bool {
+        let mut heights = [[0.0; 3]; 32];
+        let planes = &self.planes[..self.planes.len().min(32)];
+        let mut all_inside = true;
+        for (plane, heights) in planes.iter().zip(&mut heights) {
+            *heights = triangle.map(|v| plane.normal.dot(v) - plane.offset - self.margin);
+            if heights.iter().all(|&h| h <= 0.0) {
+                return false;
+            }
+            all_inside &= heights.iter().all(|&h| h > 0.0);
+        }
+        all_inside || self.clips_to_something(triangle)
+    }
+
+    /// Cuts the triangle down to the shaft; something left means that it reaches in.
+    fn clips_to_something(&self, triangle: &[DVec3; 3]) -> bool {
+        let mut corners = [DVec3::ZERO; 40];
+        corners[..3].copy_from_slice(triangle);
+        let mut count = 3;
+        for plane in &self.planes {
+            let mut next = [DVec3::ZERO; 40];
+            let mut kept = 0;
+            for i in 0..count {
+                let (a, b) = (corners[i], corners[if i + 1 == count { 0 } else { i + 1 }]);
+                let (ha, hb) = (plane.height(a) - self.margin, plane.height(b) - self.margin);
+                if kept + 2 > next.len() {
+                    return true; // More planes than a shaft has: say yes, which is always safe.
+                }
+                if ha > 0.0 {
+                    next[kept] = a;
+                    kept += 1;
+                }
+                if (ha > 0.0) != (hb > 0.0) {
+                    next[kept] = a + (b - a) * (ha / (ha - hb));
+                    kept += 1;
+                }
+            }
+            if kept == 0 {
+                return false;
+            }
+            corners = next;
+            count = kept;
+        }
+        true
+    }
+
+    /// Appends those of `candidates` that reach into the shaft.
+    pub fn filter(&self, tracer: &Tracer, candidates: &[u32], out: &mut Vec<u32>) {
+        out.extend(candidates.iter().copied().filter(|&t| self.touches(&tracer.triangles()[t as usize])));
+    }
+
+    /// Appends all of the scene's triangles that reach into the shaft, in ascending order.
+    pub fn gather(&self, tracer: &Tracer, out: &mut Vec<u32>) {
+        let first = out.len();
+        tracer.visit(
+            |bounds| self.may_touch(bounds),
+            |t| {
+                if self.touches(&tracer.triangles()[t as usize]) {
+                    out.push(t);
+                }
+            },
+        );
+        out[first..].sort_unstable();
+    }
+}
+
+impl HalfSpace {
+    fn height(&self, p: DVec3) -> f64 {
+        self.normal.dot(p) - self.offset
+    }
+}
+
+/// The plane of `polygon` itself bounds the hull where `other` lies wholly on one side of it.
+fn add_caps(polygon: &[DVec3], other: &[DVec3], margin: f64, planes: &mut Vec<HalfSpace>) {
+    let Some(normal) = normal_of(polygon) else { return };
+    let offset = normal.dot(polygon[0]);
+    add_supporting(HalfSpace { normal, offset }, other, margin, planes);
+}
+
+/// Planes through an edge of `polygon` and a corner of `other` that have all of both on one side.
+fn add_sides(polygon: &[DVec3], other: &[DVec3], margin: f64, planes: &mut Vec<HalfSpace>) {
+    if polygon.len() < 2 {
+        return;
+    }
+    for (i, &a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        for &c in other {
+            let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+            let plane = HalfSpace { normal, offset: normal.dot(a) };
+            let own = side_of(plane, polygon, margin);
+            let others = side_of(plane, other, margin);
+            let side = match (own, others) {
+                (Side::Mixed, _) | (_, Side::Mixed) => continue,
+                (Side::On, s) | (s, Side::On) => s,
+                (s, t) if s == t => s,
+                _ => continue,
+            };
+            push_oriented(plane, side, planes);
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Front,
+    Behind,
+    On,
+    Mixed,
+}
+
+fn side_of(plane: HalfSpace, points: &[DVec3], margin: f64) -> Side {
+    let mut side = Side::On;
+    for &p in points {
+        let h = plane.height(p);
+        let this = if h > margin {
+            Side::Front
+        } else if h < -margin {
+            Side::Behind
+        } else {
+            continue;
+        };
+        if side == Side::On {
+            side = this;
+        } else if side != this {
+            return Side::Mixed;
+        }
+    }
+    side
+}
+
+fn add_supporting(plane: HalfSpace, others: &[DVec3], margin: f64, planes: &mut Vec<HalfSpace>) {
+    push_oriented(plane, side_of(plane, others, margin), planes);
+}
+
+fn push_oriented(plane: HalfSpace, side: Side, planes: &mut Vec<HalfSpace>) {
+    let oriented = match side {
+        Side::Front => plane,
+        Side::Behind => HalfSpace { normal: -plane.normal, offset: -plane.offset },
+        Side::On | Side::Mixed => return,
+    };
+    // The same face can come from several corner pairs.
+    if !planes.iter().any(|p| p.normal.dot(oriented.normal) > 1.0 - 1e-12) {
+        planes.push(oriented);
+    }
+}
+
+/// Newell's normal; `None` for a point, a line, or nothing.
+fn normal_of(polygon: &[DVec3]) -> Option<DVec3> {
+    let &origin = polygon.first()?;
+    polygon
+        .windows(2)
+        .map(|e| (e[0] - origin).cross(e[1] - origin))
+        .sum::<DVec3>()
+        .try_normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MARGIN: f64 = 1e-9;
+
+    fn square(z: f64, half: f64) -> [DVec3; 4] {
+        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x * half, y * half, z))
+    }
+
+    fn small_triangle(centre: DVec3, size: f64) -> [DVec3; 3] {
+        [
+            centre + DVec3::new(size, 0.0, 0.0),
+            centre + DVec3::new(-size, size, 0.0),
+            centre + DVec3::new(-size, -size, 0.1 * size),
+        ]
+    }
+
+    /// A second method: a segment between random points of the polygons that meets the triangle.
+    fn some_segment_meets(receiver: [DVec3; 4], shooter: [DVec3; 4], triangle: [DVec3; 3]) -> bool {
+        let tracer = Tracer::new(vec![triangle]);
+        let grid = |i: u32| f64::from(i) / 12.0;
+        let at = |q: [DVec3; 4], u: f64, v: f64| q[0].lerp(q[1], u).lerp(q[3].lerp(q[2], u), v);
+        (0..13 * 13 * 13 * 13).any(|k: u32| {
+            let (a, b, c, d) = (k % 13, k / 13 % 13, k / 169 % 13, k / 2197);
+            tracer.occluded(at(receiver, grid(a), grid(b)), at(shooter, grid(c), grid(d)))
+        })
+    }
+
+    #[test]
+    fn what_blocks_a_segment_is_in_the_shaft() {
+        let (receiver, shooter) = (square(0.0, 1.0), square(2.0, 0.3));
+        let shaft = Shaft::between(&receiver, &shooter, MARGIN);
+        let mut inside = 0;
+        for k in 0..40 {
+            let t = f64::from(k);
+            let centre =
+                DVec3::new(1.6 * (t * 0.7).sin(), 1.6 * (t * 1.3).cos(), 0.2 + 1.6 * (t * 0.37).fract());
+            let triangle = small_triangle(centre, 0.35);
+            if some_segment_meets(receiver, shooter, triangle) {
+                assert!(shaft.touches(&triangle), "{centre}");
+                assert!(shaft.may_touch(Bounds::of(triangle)), "{centre}");
+                inside += 1;
+            }
+        }
+        assert!((5..35).contains(&inside), "the cases must fall on both sides, {inside} inside");
+    }
+
+    #[test]
+    fn what_stands_beside_it_is_not() {
+        let shaft = Shaft::between(&square(0.0, 1.0), &square(2.0, 1.0), MARGIN);
+        assert!(!shaft.touches(&small_triangle(DVec3::new(1.5, 0.0, 1.0), 0.4)));
+        assert!(!shaft.touches(&small_triangle(DVec3::new(0.0, 0.0, 2.5), 0.4)));
+        assert!(shaft.touches(&small_triangle(DVec3::new(1.3, 0.0, 1.0), 0.4)));
+    }
+
+    #[test]
+    fn a_wall_along_the_edge_hides_nothing() {
+        let shaft = Shaft::between(&square(0.0, 1.0), &square(2.0, 1.0), MARGIN);
+        let wall = [DVec3::new(1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 0.0, 2.0)];
+        assert!(!shaft.touches(&wall));
+    }
+
+    #[test]
+    fn a_point_makes_a_pyramid() {
+        let shaft = Shaft::between(&square(0.0, 1.0), &[DVec3::new(0.0, 0.0, 2.0)], MARGIN);
+        assert!(shaft.touches(&small_triangle(DVec3::new(0.0, 0.0, 1.0), 0.1)));
+        assert!(!shaft.touches(&small_triangle(DVec3::new(0.8, 0.0, 1.0), 0.1)));
+    }
+}
