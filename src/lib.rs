@@ -8,6 +8,7 @@ pub mod progress;
 pub mod raster;
 pub mod retriangulate;
 pub mod scene;
+pub mod solve;
 pub mod surface;
 pub mod trace;
 pub mod unwrap;

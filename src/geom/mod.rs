@@ -1,6 +1,7 @@
 //! Geometry that several stages share: frames, boxes, planar polygons.
 pub mod bounds;
 pub mod frame;
+pub mod hull;
 pub mod polygon;
 pub mod triangle;
 

@@ -1,0 +1,389 @@
+//! What shoots first: glowing surfaces and punctual lights.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+
+use super::form_factor::{SurfacePoint, signed_point_to_polygon};
+use super::visible::{ConvexParts, Workspace, visible_form_factor};
+use crate::geom::hull::{convex_hull, is_convex};
+use crate::geom::{Frame, Ring};
+use crate::scene::{PunctualKind, PunctualLight};
+use crate::trace::Tracer;
+use crate::trace::shaft::Shaft;
+
+/// Up to this many occluders are subtracted exactly; beyond, rays are counted.
+const MOST_EXACT_OCCLUDERS: usize = 24;
+
+/// Rays that stand in for the exact visibility, a square number.
+const RAYS_A_SIDE: u32 = 8;
+
+/// A glowing planar polygon of uniform radiance, one side of it.
+#[derive(Clone, Debug)]
+pub struct AreaEmitter {
+    parts: Vec<Vec<DVec3>>,
+    /// The convex hull, world space: for shafts.
+    hull: Vec<DVec3>,
+    frame: Frame,
+    /// Exitance `π L`.
+    exitance: DVec3,
+    /// Square metres.
+    area: f64,
+}
+
+/// Something that light comes from.
+#[derive(Clone, Debug)]
+pub enum Emitter {
+    /// A glowing polygon.
+    Area(AreaEmitter),
+    /// A point, spot or directional light.
+    Punctual(PunctualLight),
+}
+
+/// What stands between a receiver and an emitter.
+#[derive(Clone, Copy, Debug)]
+pub enum Between<'a> {
+    /// Nothing: the shaft is empty.
+    Nothing,
+    /// These triangles at most.
+    Triangles(&'a [u32]),
+}
+
+/// How much was evaluated which way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Evaluated without asking for visibility: the shaft was empty.
+    pub unoccluded: u64,
+    /// Occluders subtracted exactly.
+    pub exact: u64,
+    /// Visibility counted by rays.
+    pub by_rays: u64,
+    /// Rays cast.
+    pub rays: u64,
+}
+
+impl Effort {
+    /// Adds another's counts.
+    pub fn add(&mut self, other: Self) {
+        self.unoccluded += other.unoccluded;
+        self.exact += other.exact;
+        self.by_rays += other.by_rays;
+        self.rays += other.rays;
+    }
+}
+
+/// Memory and counters for evaluating emitters.
+#[derive(Default)]
+pub struct Evaluation {
+    workspace: Workspace,
+    /// What was done so far.
+    pub effort: Effort,
+}
+
+impl AreaEmitter {
+    /// A polygon in `frame`, whose normal is the emitting side, with exitance `π L`.
+    ///
+    /// `triangles` are the same polygon as `rings`, counter-clockwise in the frame.
+    #[must_use]
+    pub fn new(frame: Frame, rings: &[Ring], triangles: &[[DVec2; 3]], exitance: DVec3) -> Self {
+        let lift = |ring: &[DVec2]| ring.iter().map(|&p| frame.lift(p)).collect::<Vec<_>>();
+        let parts = match rings {
+            [ring] if ring.len() <= 8 && is_convex(ring) => vec![lift(ring)],
+            _ => triangles.iter().map(|t| lift(t)).collect(),
+        };
+        let hull = lift(&convex_hull(rings.iter().flatten().copied().collect()));
+        let area = crate::geom::polygon::area(rings);
+        Self { parts, hull, frame, exitance, area }
+    }
+
+    /// The power that leaves it.
+    #[must_use]
+    pub fn power(&self) -> DVec3 {
+        self.exitance * self.area
+    }
+
+    fn unoccluded(&self, receiver: SurfacePoint) -> f64 {
+        if self.frame.height(receiver.position) <= 0.0 {
+            return 0.0;
+        }
+        self.parts.iter().map(|p| signed_point_to_polygon(receiver, p)).sum::<f64>().clamp(0.0, 1.0)
+    }
+
+    fn visible(&self, receiver: SurfacePoint, tracer: &Tracer, between: &[u32], e: &mut Evaluation) -> f64 {
+        if between.len() <= MOST_EXACT_OCCLUDERS {
+            let parts =
+                ConvexParts { parts: &self.parts, normal: self.frame.normal, origin: self.frame.origin };
+            let occluders = between.iter().map(|&t| &tracer.triangles()[t as usize]);
+            if let Some(f) = visible_form_factor(receiver, parts, occluders, &mut e.workspace) {
+                e.effort.exact += 1;
+                return f;
+            }
+        }
+        e.effort.by_rays += 1;
+        let unoccluded = self.unoccluded(receiver);
+        if unoccluded == 0.0 { 0.0 } else { unoccluded * self.fraction_by_rays(receiver, tracer, e) }
+    }
+
+    /// The kernel-weighted fraction of sample points in sight.
+    fn fraction_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, e: &mut Evaluation) -> f64 {
+        let (mut seen, mut all) = (0.0, 0.0);
+        let whole: f64 = self.parts.iter().map(|p| fan_area(p)).sum();
+        for part in &self.parts {
+            let share = fan_area(part) / whole;
+            let side = ((f64::from(RAYS_A_SIDE) * share.sqrt()).ceil() as u32).clamp(1, RAYS_A_SIDE);
+            let area = share / f64::from(side * side);
+            for k in 0..side * side {
+                let u = (f64::from(k % side) + 0.5) / f64::from(side);
+                let v = (f64::from(k / side) + 0.5) / f64::from(side);
+                let q = point_in_fan(part, u, v);
+                let d = q - receiver.position;
+                let square = d.length_squared();
+                let kernel =
+                    receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0) / (square * square);
+                if kernel > 0.0 {
+                    all += kernel * area;
+                    e.effort.rays += 1;
+                    if !tracer.occluded(receiver.position, q + self.frame.normal * tracer.margin()) {
+                        seen += kernel * area;
+                    }
+                }
+            }
+        }
+        if all > 0.0 { seen / all } else { 0.0 }
+    }
+}
+
+fn fan_area(part: &[DVec3]) -> f64 {
+    (1..part.len().saturating_sub(1)).map(|i| crate::geom::triangle::area([part[0], part[i], part[i + 1]])).sum()
+}
+
+/// Maps the unit square onto a convex polygon, area for area.
+fn point_in_fan(part: &[DVec3], u: f64, v: f64) -> DVec3 {
+    let mut target = u * fan_area(part);
+    let last = part.len() - 2;
+    for i in 1..=last {
+        let area = crate::geom::triangle::area([part[0], part[i], part[i + 1]]);
+        if target <= area || i == last {
+            let s = if area > 0.0 { (target / area).clamp(0.0, 1.0) } else { 0.5 };
+            let r = v.sqrt();
+            return part[0].lerp(part[i].lerp(part[i + 1], s), r);
+        }
+        target -= area;
+    }
+    part[0]
+}
+
+impl Emitter {
+    /// The irradiance that it gives to `receiver`, past what stands `between`.
+    ///
+    /// `receiver.position` must be off its surface by [`Tracer::margin`].
+    pub fn irradiance(
+        &self,
+        receiver: SurfacePoint,
+        tracer: &Tracer,
+        between: Between,
+        evaluation: &mut Evaluation,
+    ) -> DVec3 {
+        match (self, between) {
+            (Self::Area(area), Between::Nothing) => {
+                evaluation.effort.unoccluded += 1;
+                area.exitance * area.unoccluded(receiver)
+            }
+            (Self::Area(area), Between::Triangles(triangles)) => {
+                area.exitance * area.visible(receiver, tracer, triangles, evaluation)
+            }
+            (Self::Punctual(light), between) => {
+                let irradiance = punctual_irradiance(light, receiver);
+                match between {
+                    Between::Triangles(_) if irradiance != DVec3::ZERO => {
+                        evaluation.effort.by_rays += 1;
+                        evaluation.effort.rays += 1;
+                        let to = self.toward(receiver.position, tracer.diagonal());
+                        if tracer.occluded(receiver.position, to) { DVec3::ZERO } else { irradiance }
+                    }
+                    _ => {
+                        evaluation.effort.unoccluded += 1;
+                        irradiance
+                    }
+                }
+            }
+        }
+    }
+
+    /// The power that it shoots; for punctual lights an upper bound's order of magnitude over a scene
+    /// of the given diagonal, which serves to order them only.
+    #[must_use]
+    pub fn power(&self, diagonal: f64) -> DVec3 {
+        match self {
+            Self::Area(area) => area.power(),
+            Self::Punctual(light) => match light.kind {
+                PunctualKind::Directional { .. } => light.intensity * diagonal * diagonal,
+                PunctualKind::Point { .. } => light.intensity * 4.0 * PI,
+                PunctualKind::Spot { outer_cone, .. } => {
+                    light.intensity * 2.0 * PI * (1.0 - outer_cone.cos())
+                }
+            },
+        }
+    }
+
+    /// The shaft from a convex receiving polygon to the emitter.
+    #[must_use]
+    pub fn shaft(&self, receiver: &[DVec3], tracer: &Tracer) -> Shaft {
+        let margin = tracer.margin() * 0.5;
+        match self {
+            Self::Area(area) => Shaft::between(receiver, &area.hull, margin),
+            Self::Punctual(light) => match light.kind {
+                PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {
+                    Shaft::between(receiver, &[position], margin)
+                }
+                PunctualKind::Directional { direction } => {
+                    let away: Vec<_> =
+                        receiver.iter().map(|&p| p - direction * (2.0 * tracer.diagonal())).collect();
+                    Shaft::between(receiver, &away, margin)
+                }
+            },
+        }
+    }
+
+    /// Points that together hide the whole emitter from `at` when each is hidden by the same convex occluder.
+    pub(crate) fn corners_seen_from(&self, at: DVec3, diagonal: f64, out: &mut Vec<DVec3>) {
+        out.clear();
+        match self {
+            Self::Area(area) => out.extend(&area.hull),
+            Self::Punctual(_) => out.push(self.toward(at, diagonal)),
+        }
+    }
+
+    /// Whether none of its light can reach a polygon that faces along `normal` with these corners.
+    #[must_use]
+    pub fn is_behind(&self, corners: &[DVec3], normal: DVec3, margin: f64) -> bool {
+        let Some(&first) = corners.first() else { return true };
+        match self {
+            Self::Area(area) => {
+                area.hull.iter().all(|&q| normal.dot(q - first) <= margin)
+                    || corners.iter().all(|&p| area.frame.height(p) <= margin)
+            }
+            Self::Punctual(light) => match light.kind {
+                PunctualKind::Directional { direction } => normal.dot(direction) >= 0.0,
+                PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {
+                    normal.dot(position - first) <= margin
+                }
+            },
+        }
+    }
+
+    /// Centre, for the paper's point-to-point estimate; the direction's far end for a directional light.
+    #[must_use]
+    pub fn centre(&self, at: DVec3, diagonal: f64) -> DVec3 {
+        match self {
+            Self::Area(area) => area.hull.iter().sum::<DVec3>() / area.hull.len().max(1) as f64,
+            Self::Punctual(_) => self.toward(at, diagonal),
+        }
+    }
+
+    /// The area polygon's normal and area; `None` for punctual lights.
+    #[must_use]
+    pub fn facing(&self) -> Option<(DVec3, f64, DVec3)> {
+        match self {
+            Self::Area(area) => Some((area.frame.normal, area.area, area.exitance)),
+            Self::Punctual(_) => None,
+        }
+    }
+
+    /// Where a shadow ray from `at` to a punctual light ends.
+    fn toward(&self, at: DVec3, diagonal: f64) -> DVec3 {
+        match self {
+            Self::Area(area) => area.frame.origin,
+            Self::Punctual(light) => match light.kind {
+                PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => position,
+                PunctualKind::Directional { direction } => at - direction * (2.0 * diagonal),
+            },
+        }
+    }
+}
+
+/// `E = I cos θ / r²` with range and cone as `KHR_lights_punctual` defines them; `E = lux cos θ` for directional lights.
+fn punctual_irradiance(light: &PunctualLight, receiver: SurfacePoint) -> DVec3 {
+    let (position, range, cone) = match light.kind {
+        PunctualKind::Directional { direction } => {
+            return light.intensity * (-direction.dot(receiver.normal)).max(0.0);
+        }
+        PunctualKind::Point { position, range } => (position, range, None),
+        PunctualKind::Spot { position, direction, range, inner_cone, outer_cone } => {
+            (position, range, Some((direction, inner_cone, outer_cone)))
+        }
+    };
+    let to_light = position - receiver.position;
+    let square = to_light.length_squared();
+    let distance = square.sqrt();
+    let cosine = receiver.normal.dot(to_light) / distance;
+    if cosine.is_nan() || cosine <= 0.0 {
+        return DVec3::ZERO;
+    }
+    let mut factor = cosine / square;
+    if range.is_finite() {
+        factor *= (1.0 - (distance / range).powi(4)).clamp(0.0, 1.0);
+    }
+    if let Some((direction, inner, outer)) = cone {
+        let scale = 1.0 / (inner.cos() - outer.cos()).max(0.001);
+        let t = ((-direction.dot(to_light) / distance - outer.cos()) * scale).clamp(0.0, 1.0);
+        factor *= t * t;
+    }
+    light.intensity * factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn floor_point(x: f64) -> SurfacePoint {
+        SurfacePoint { position: DVec3::new(x, 0.0, 0.0), normal: DVec3::Z }
+    }
+
+    fn lamp() -> AreaEmitter {
+        let frame = Frame::new(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, DVec3::X);
+        let ring = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        let t = [[ring[0], ring[1], ring[2]], [ring[0], ring[2], ring[3]]];
+        AreaEmitter::new(frame, &[ring], &t, DVec3::ONE)
+    }
+
+    /// Exact clipping and kernel-weighted rays are two methods for the same number.
+    #[test]
+    fn rays_agree_with_the_exact_visibility() {
+        let blocker = [DVec3::new(-0.4, -3.0, 1.0), DVec3::new(0.1, 3.0, 1.0), DVec3::new(-3.0, 0.0, 1.2)];
+        let tracer = Tracer::new(vec![blocker]);
+        let lamp = lamp();
+        let mut e = Evaluation::default();
+        for x in [-0.6, 0.0, 0.3, 0.6] {
+            let exact = lamp.visible(floor_point(x), &tracer, &[0], &mut e);
+            let rays = lamp.unoccluded(floor_point(x)) * lamp.fraction_by_rays(floor_point(x), &tracer, &mut e);
+            // 64 rays resolve the edge to an eighth of the lamp's side.
+            assert!((exact - rays).abs() < 0.1 * lamp.unoccluded(floor_point(x)), "{x}: {exact} {rays}");
+        }
+        assert!(e.effort.rays > 0 && e.effort.exact == 4);
+    }
+
+    #[test]
+    fn punctual_lights_follow_their_laws() {
+        let light = |kind| PunctualLight { kind, intensity: DVec3::splat(8.0), node: 0 };
+        let position = DVec3::new(0.0, 0.0, 2.0);
+        let e = |kind, x| punctual_irradiance(&light(kind), floor_point(x)).x;
+        let point = PunctualKind::Point { position, range: f64::INFINITY };
+        assert!((e(point, 0.0) - 2.0).abs() < 1e-12);
+        assert!((e(point, 2.0) - 8.0 * 0.5_f64.sqrt() / 8.0).abs() < 1e-12);
+        assert!(e(PunctualKind::Point { position, range: 2.0 }, 0.1) == 0.0, "out of range");
+        let spot = PunctualKind::Spot {
+            position,
+            direction: -DVec3::Z,
+            range: f64::INFINITY,
+            inner_cone: 0.3,
+            outer_cone: 0.6,
+        };
+        assert!((e(spot, 0.0) - 2.0).abs() < 1e-12);
+        assert!(e(spot, 2.0) == 0.0, "45 degrees is outside of the cone");
+        let half_way = 2.0 * f64::tan(0.45);
+        assert!(e(spot, half_way) > 0.0 && e(spot, half_way) < e(point, half_way));
+        let sun = PunctualKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8) };
+        assert!((e(sun, 5.0) - 6.4).abs() < 1e-12);
+    }
+}

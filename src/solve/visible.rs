@@ -1,0 +1,280 @@
+//! How much of an emitter a point sees, exactly.
+//!
+//! Each occluding triangle is cut to what lies between the point and the emitter's
+//! plane; what remains is a convex polygon whose shadow pyramid, with its tip in the
+//! point, is subtracted from the emitter's convex parts. What is left of the emitter
+//! is a set of convex polygons, and Lambert's closed form is summed over them: penumbrae
+//! without noise. The idea is that of Nishita and Nakamae, "Continuous Tone Representation
+//! of Three-Dimensional Objects Taking Account of Shadows and Interreflection", 1985.
+//!
+//! The cost grows with the number of occluders; callers keep the list short with a
+//! [`Shaft`](crate::trace::shaft::Shaft) and fall back to rays where it is long.
+
+use glam::DVec3;
+
+use super::form_factor::{SurfacePoint, signed_point_to_polygon};
+
+/// Corners that a convex part may have after cutting; more than this many cuts at one
+/// part's edges do not occur with the few occluders that are subtracted exactly.
+const MOST_CORNERS: usize = 16;
+
+/// A convex polygon of few corners, relative to the receiving point.
+#[derive(Clone, Copy)]
+struct Part {
+    corners: [DVec3; MOST_CORNERS],
+    count: usize,
+}
+
+/// Memory that is kept between calls.
+#[derive(Default)]
+pub struct Workspace {
+    parts: Vec<Part>,
+    next: Vec<Part>,
+}
+
+/// The emitter that [`visible_form_factor`] looks at: convex parts in one plane.
+#[derive(Clone, Copy, Debug)]
+pub struct ConvexParts<'a> {
+    /// World-space corners of each part, counter-clockwise seen from the emitting side.
+    pub parts: &'a [Vec<DVec3>],
+    /// The emitting side's unit normal.
+    pub normal: DVec3,
+    /// A point of the plane.
+    pub origin: DVec3,
+}
+
+/// The form factor from `receiver` to the visible part of `emitter`.
+///
+/// `occluders` must hold every triangle that reaches into the space between the two;
+/// more do no harm. `None` when the cutting got out of hand: count rays instead.
+pub fn visible_form_factor<'t>(
+    receiver: SurfacePoint,
+    emitter: ConvexParts,
+    occluders: impl Iterator<Item = &'t [DVec3; 3]>,
+    workspace: &mut Workspace,
+) -> Option<f64> {
+    let x = receiver.position;
+    let plane_offset = emitter.normal.dot(emitter.origin - x);
+    if plane_offset >= 0.0 {
+        return Some(0.0); // behind the emitter
+    }
+    workspace.parts.clear();
+    for part in emitter.parts {
+        let part = Part::new(part.iter().map(|&v| v - x))?.cut(receiver.normal, 0.0)?;
+        if part.count >= 3 {
+            workspace.parts.push(part);
+        }
+    }
+    for triangle in occluders {
+        if workspace.parts.is_empty() {
+            return Some(0.0);
+        }
+        // What casts a shadow is above the horizon and on this side of the emitter's plane.
+        let shade = Part::new(triangle.iter().map(|&v| v - x))?
+            .cut(receiver.normal, 0.0)?
+            .cut(emitter.normal, plane_offset)?;
+        if shade.count >= 3 {
+            subtract(&shade, workspace)?;
+        }
+    }
+    let seen_from_x = SurfacePoint { position: DVec3::ZERO, normal: receiver.normal };
+    let sum: f64 =
+        workspace.parts.iter().map(|p| signed_point_to_polygon(seen_from_x, &p.corners[..p.count])).sum();
+    Some(sum.clamp(0.0, 1.0))
+}
+
+/// Removes from all parts what lies in the pyramid over `shade` with its tip in the origin.
+fn subtract(shade: &Part, workspace: &mut Workspace) -> Option<()> {
+    let mut sides = [DVec3::ZERO; MOST_CORNERS];
+    let inner = shade.corners[..shade.count].iter().sum::<DVec3>();
+    let mut count = 0;
+    for i in 0..shade.count {
+        let side = shade.corners[i].cross(shade.corners[(i + 1) % shade.count]);
+        // A side seen edge-on, or an edge too short to matter, bounds nothing.
+        if side.length_squared() > 0.0 {
+            sides[count] = if side.dot(inner) >= 0.0 { side } else { -side };
+            count += 1;
+        }
+    }
+    let sides = &sides[..count];
+    if is_flat(shade, inner) {
+        return Some(()); // the point lies in the occluder's plane, so it covers no angle
+    }
+    workspace.next.clear();
+    for part in &workspace.parts {
+        if sides.iter().any(|&s| part.is_outside(s)) {
+            workspace.next.push(*part);
+            continue;
+        }
+        let mut rest = *part;
+        for &side in sides {
+            let outside = rest.cut(-side, 0.0)?;
+            if outside.count >= 3 {
+                workspace.next.push(outside);
+            }
+            rest = rest.cut(side, 0.0)?;
+            if rest.count < 3 {
+                break;
+            }
+        }
+    }
+    std::mem::swap(&mut workspace.parts, &mut workspace.next);
+    Some(())
+}
+
+/// Whether the origin lies in the polygon's plane, so that its pyramid has no volume.
+fn is_flat(shade: &Part, inner: DVec3) -> bool {
+    let normal = (shade.corners[1] - shade.corners[0]).cross(shade.corners[2] - shade.corners[0]);
+    normal.dot(inner).abs() <= 1e-12 * normal.length() * inner.length()
+}
+
+impl Part {
+    fn new(corners: impl Iterator<Item = DVec3>) -> Option<Self> {
+        let mut part = Self { corners: [DVec3::ZERO; MOST_CORNERS], count: 0 };
+        for corner in corners {
+            *part.corners.get_mut(part.count)? = corner;
+            part.count += 1;
+        }
+        Some(part)
+    }
+
+    fn is_outside(&self, side: DVec3) -> bool {
+        self.corners[..self.count].iter().all(|c| c.dot(side) <= 0.0)
+    }
+
+    /// The part of this polygon where `normal · p ≥ offset`.
+    fn cut(&self, normal: DVec3, offset: f64) -> Option<Self> {
+        let corners = &self.corners[..self.count];
+        if corners.iter().all(|c| normal.dot(*c) >= offset) {
+            return Some(*self);
+        }
+        let mut out = Self { corners: [DVec3::ZERO; MOST_CORNERS], count: 0 };
+        let Some(&last) = corners.last() else { return Some(out) };
+        let (mut a, mut height_a) = (last, normal.dot(last) - offset);
+        for &b in corners {
+            let height_b = normal.dot(b) - offset;
+            if (height_a >= 0.0) != (height_b >= 0.0) {
+                *out.corners.get_mut(out.count)? = a.lerp(b, height_a / (height_a - height_b));
+                out.count += 1;
+            }
+            if height_b >= 0.0 {
+                *out.corners.get_mut(out.count)? = b;
+                out.count += 1;
+            }
+            (a, height_a) = (b, height_b);
+        }
+        Some(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::form_factor::point_to_polygon;
+    use super::*;
+
+    /// Cutting and summing differ from the one closed form by rounding only.
+    const EXACT: f64 = 1e-12;
+
+    fn ceiling(z: f64, half: f64) -> Vec<DVec3> {
+        [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
+            .map(|(x, y)| DVec3::new(x * half, y * half, z))
+            .to_vec()
+    }
+
+    fn looking_up(parts: &[Vec<DVec3>]) -> ConvexParts<'_> {
+        ConvexParts { parts, normal: -DVec3::Z, origin: parts[0][0] }
+    }
+
+    fn at(x: f64, y: f64) -> SurfacePoint {
+        SurfacePoint { position: DVec3::new(x, y, 0.0), normal: DVec3::Z }
+    }
+
+    fn as_triangles(quad: &[DVec3]) -> [[DVec3; 3]; 2] {
+        [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]
+    }
+
+    /// A square blocker halfway up hides the square twice its size as seen from straight below,
+    /// and from beside exactly the rectangle that its projection covers.
+    #[test]
+    fn a_blocker_hides_its_projection() {
+        let parts = [ceiling(2.0, 1.0)];
+        let blocker = as_triangles(&ceiling(1.0, 0.3));
+        let mut workspace = Workspace::default();
+        for (x, y) in [(0.0, 0.0), (0.4, 0.1), (0.9, -0.7), (2.5, 0.0)] {
+            let receiver = at(x, y);
+            let actual =
+                visible_form_factor(receiver, looking_up(&parts), blocker.iter(), &mut workspace).unwrap();
+            // The shadow of the blocker on the ceiling's plane, intersected with the ceiling.
+            let (low_x, high_x) = ((2.0 * -0.3 - x).max(-1.0), (2.0 * 0.3 - x).min(1.0));
+            let (low_y, high_y) = ((2.0 * -0.3 - y).max(-1.0), (2.0 * 0.3 - y).min(1.0));
+            let hidden = if low_x < high_x && low_y < high_y {
+                let c = |x, y| DVec3::new(x, y, 2.0);
+                point_to_polygon(
+                    receiver,
+                    &[c(low_x, low_y), c(low_x, high_y), c(high_x, high_y), c(high_x, low_y)],
+                )
+            } else {
+                0.0
+            };
+            let expected = point_to_polygon(receiver, &parts[0]) - hidden;
+            assert!((actual - expected).abs() < EXACT, "({x}, {y}): {actual} != {expected}");
+        }
+    }
+
+    /// A second method: midpoint sampling of the emitter with shadow rays.
+    #[test]
+    fn overlapping_occluders_count_once() {
+        let parts = [ceiling(2.0, 1.0)];
+        let occluders: Vec<[DVec3; 3]> = (0..6)
+            .map(|k| {
+                let t = f64::from(k);
+                let c = DVec3::new(0.7 * (t * 1.1).sin(), 0.7 * (t * 2.3).cos(), 0.5 + 0.2 * t);
+                [c + DVec3::X * 0.5, c + DVec3::new(-0.3, 0.4, 0.1), c - DVec3::new(0.2, 0.5, 0.1)]
+            })
+            .collect();
+        let tracer = crate::trace::Tracer::new(occluders.clone());
+        let mut workspace = Workspace::default();
+        for (x, y) in [(0.0, 0.0), (0.8, 0.3), (-0.5, -0.9)] {
+            let receiver = at(x, y);
+            let exact =
+                visible_form_factor(receiver, looking_up(&parts), occluders.iter(), &mut workspace).unwrap();
+            let (mut sum, cells) = (0.0, 300);
+            for k in 0..cells * cells {
+                let cell = |i: i32| (f64::from(i) + 0.5) / f64::from(cells) * 2.0 - 1.0;
+                let q = DVec3::new(cell(k % cells), cell(k / cells), 2.0);
+                if !tracer.occluded(receiver.position, q) {
+                    let d = q - receiver.position;
+                    sum += d.z * d.z / d.length_squared().powi(2);
+                }
+            }
+            let sampled = sum * 4.0 / f64::from(cells * cells) / std::f64::consts::PI;
+            assert!((exact - sampled).abs() < 2e-3 * exact.max(0.1), "({x}, {y}): {exact} {sampled}");
+        }
+    }
+
+    #[test]
+    fn what_stands_behind_the_emitter_or_below_the_horizon_hides_nothing() {
+        let parts = [ceiling(2.0, 1.0)];
+        let whole = point_to_polygon(at(0.0, 0.0), &parts[0]);
+        let mut workspace = Workspace::default();
+        for z in [2.5, -0.5] {
+            let occluders = as_triangles(&ceiling(z, 3.0));
+            let actual =
+                visible_form_factor(at(0.0, 0.0), looking_up(&parts), occluders.iter(), &mut workspace);
+            assert!((actual.unwrap() - whole).abs() < EXACT);
+        }
+    }
+
+    /// A wall that passes through the emitter's plane shades on this side of it only.
+    #[test]
+    fn an_occluder_through_the_emitter_is_cut_at_its_plane() {
+        let parts = [ceiling(2.0, 1.0)];
+        let wall = [DVec3::new(0.0, -9.0, 1.0), DVec3::new(0.0, 9.0, 1.0), DVec3::new(0.0, 0.0, 40.0)];
+        let mut workspace = Workspace::default();
+        let seen = visible_form_factor(at(-0.5, 0.0), looking_up(&parts), [wall].iter(), &mut workspace);
+        let c = |x, y| DVec3::new(x, y, 2.0);
+        let left = point_to_polygon(at(-0.5, 0.0), &[c(-1.0, -1.0), c(-1.0, 1.0), c(0.0, 1.0), c(0.0, -1.0)]);
+        let low = visible_form_factor(at(-0.5, 0.0), looking_up(&parts), [].iter(), &mut workspace);
+        assert!(seen.unwrap() >= left - EXACT && seen.unwrap() < low.unwrap() - 0.01);
+    }
+}
