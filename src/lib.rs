@@ -1,4 +1,6 @@
 //! cobake bakes lightmaps: glTF in, glTF with EXR lightmaps out.
+pub mod cob;
+pub mod element;
 pub mod error;
 pub mod export;
 pub mod geom;

@@ -75,7 +75,9 @@ impl Tracer {
             .map(|t| Boxed(obvhs::aabb::Aabb::from_points(&[local(t[0]), local(t[1]), local(t[2])])))
             .collect();
         let mut build_time = Duration::default();
-        let boxes = build_bvh2(&boxed, BvhBuildParams::medium_build(), &mut build_time);
+        // The wide tree is made from leaves of one triangle; it gathers up to three itself.
+        let params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
+        let boxes = build_bvh2(&boxed, params, &mut build_time);
         let rays = bvh2_to_cwbvh(&boxes, 3, true, false);
         let ordered = rays
             .primitive_indices

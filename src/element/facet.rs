@@ -1,0 +1,141 @@
+//! Facets: one side of a tile of a region, with its elements and samples.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+
+use super::{Element, NONE};
+use crate::cob::CobLists;
+use crate::geom::{Frame, Ring};
+use crate::solve::form_factor::SurfacePoint;
+
+/// A side of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The side the winding shows; lightmaps hold this one.
+    Front,
+    /// The back of a `doubleSided` material.
+    Back,
+}
+
+/// Where light is received.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// Place on the facet, plane coordinates, inside the outline.
+    pub position: DVec2,
+    /// The same in space, lifted off the surface.
+    pub point: SurfacePoint,
+}
+
+/// One side of a tile of a region, with the tree of elements over it.
+#[derive(Clone, Debug)]
+pub struct Facet {
+    /// Index of the surface.
+    pub surface: usize,
+    /// Index of the region in that surface.
+    pub region: usize,
+    /// Which side of the surface.
+    pub side: Side,
+    /// Plane coordinates; the normal points to the side that receives. On the back, `y` runs the other way
+    /// than in the surface's frame.
+    pub frame: Frame,
+    /// The outline inside this tile.
+    pub rings: Vec<Ring>,
+    /// Emitted exitance `π L`.
+    pub exitance: DVec3,
+    /// The tree; element 0 is the whole facet, children come after their parents.
+    pub elements: Vec<Element>,
+    /// Receiving places.
+    pub samples: Vec<Sample>,
+    /// Close objects of elements that have some.
+    pub cobs: CobLists,
+    pub(super) lattice: HashMap<[u32; 2], u32>,
+    /// How far samples keep from the outline, and from the surface, metres.
+    pub(super) nudge: f64,
+    /// How far samples are lifted off the surface, metres.
+    pub(super) lift: f64,
+}
+
+impl Facet {
+    /// Plane coordinates in the surface's frame to this facet's.
+    #[must_use]
+    pub fn from_surface_plane(&self, p: DVec2) -> DVec2 {
+        match self.side {
+            Side::Front => p,
+            Side::Back => DVec2::new(p.x, -p.y),
+        }
+    }
+
+    /// The element's outline hull in world space, counter-clockwise seen from the receiving side.
+    #[must_use]
+    pub fn hull(&self, element: u32) -> Vec<DVec3> {
+        let e = &self.elements[element as usize];
+        match &e.cut {
+            Some(cut) if cut.hull.len() >= 3 => cut.hull.iter().map(|&p| self.frame.lift(p)).collect(),
+            _ => [e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)]
+                .map(|p| self.frame.lift(p))
+                .to_vec(),
+        }
+    }
+
+    /// The element's centroid as a receiving point.
+    #[must_use]
+    pub fn centre(&self, element: u32) -> SurfacePoint {
+        let position = self.frame.lift(self.elements[element as usize].centroid);
+        SurfacePoint { position: position + self.frame.normal * self.lift, normal: self.frame.normal }
+    }
+
+    /// The leaf at `p`, or the nearest one inside the facet's rectangle.
+    #[must_use]
+    pub fn leaf_at(&self, p: DVec2) -> u32 {
+        let root = &self.elements[0];
+        let p = p.clamp(root.min, root.max);
+        let mut leaf = 0;
+        while let Some(child) = self.child_at(leaf, p) {
+            leaf = child;
+        }
+        leaf
+    }
+
+    /// The part of `element` that contains `p`, or, where the outline left none there, the nearest part.
+    fn child_at(&self, element: u32, p: DVec2) -> Option<u32> {
+        let distance = |&c: &u32| {
+            let e = &self.elements[c as usize];
+            p.clamp(e.min, e.max).distance_squared(p)
+        };
+        self.elements[element as usize].children().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// What `element` and its ancestors received at `p`: direct, indirect.
+    #[must_use]
+    pub fn received(&self, element: u32, p: DVec2) -> (DVec3, DVec3) {
+        let (mut direct, mut indirect) = (DVec3::ZERO, DVec3::ZERO);
+        let mut at = element;
+        while at != NONE {
+            let e = &self.elements[at as usize];
+            direct += e.interpolate(&e.direct, p);
+            indirect += e.interpolate(&e.indirect, p);
+            at = e.parent;
+        }
+        (direct.max(DVec3::ZERO), indirect.max(DVec3::ZERO))
+    }
+
+    /// Mean direct irradiance over `element`, its parts and its ancestors included.
+    #[must_use]
+    pub fn mean_direct(&self, element: u32) -> DVec3 {
+        let e = &self.elements[element as usize];
+        if e.is_leaf() {
+            return self.received(element, e.centroid).0;
+        }
+        let (sum, area) = e.children().fold((DVec3::ZERO, 0.0), |(sum, area), c| {
+            let a = self.elements[c as usize].area;
+            (sum + a * self.mean_direct(c), area + a)
+        });
+        sum / area
+    }
+
+    /// The leaves in tree order.
+    pub fn leaves(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.elements.len() as u32).filter(|&e| self.elements[e as usize].is_leaf())
+    }
+}
