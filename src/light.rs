@@ -28,3 +28,9 @@ pub struct Radiosity(pub DVec3);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Reflectance(pub DVec3);
+
+/// Relative luminance of linear Rec. 709 RGB.
+#[must_use]
+pub fn luminance(rgb: DVec3) -> f64 {
+    rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}

@@ -1,5 +1,9 @@
 //! Stage 7: from charts and the radiosity mesh to texels.
 
+pub mod buried;
+pub mod direct;
+pub mod locate;
+
 /// A finished lightmap page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lightmap {

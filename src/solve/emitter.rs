@@ -12,11 +12,21 @@ use crate::scene::{PunctualKind, PunctualLight};
 use crate::trace::Tracer;
 use crate::trace::shaft::Shaft;
 
-/// Up to this many occluders are subtracted exactly; beyond, rays are counted.
-const MOST_EXACT_OCCLUDERS: usize = 24;
+/// How hard to look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Precision {
+    /// Up to this many occluders are subtracted exactly; beyond, rays are counted.
+    pub exact_occluders: usize,
+    /// Rays that stand in for the exact visibility, along one side of their grid.
+    pub rays_a_side: u32,
+}
 
-/// Rays that stand in for the exact visibility, a square number.
-const RAYS_A_SIDE: u32 = 8;
+impl Precision {
+    /// For emitters: few, strong, and seen in every shadow's edge.
+    pub const EMITTER: Self = Self { exact_occluders: 24, rays_a_side: 8 };
+    /// For reflectors: many, each weak.
+    pub const REFLECTOR: Self = Self { exact_occluders: 4, rays_a_side: 3 };
+}
 
 /// A glowing planar polygon of uniform radiance, one side of it.
 #[derive(Clone, Debug)]
@@ -73,11 +83,19 @@ impl Effort {
 }
 
 /// Memory and counters for evaluating emitters.
-#[derive(Default)]
 pub struct Evaluation {
     workspace: Workspace,
+    precision: Precision,
     /// What was done so far.
     pub effort: Effort,
+}
+
+impl Evaluation {
+    /// Nothing done yet.
+    #[must_use]
+    pub fn new(precision: Precision) -> Self {
+        Self { workspace: Workspace::default(), precision, effort: Effort::default() }
+    }
 }
 
 impl AreaEmitter {
@@ -110,7 +128,7 @@ impl AreaEmitter {
     }
 
     fn visible(&self, receiver: SurfacePoint, tracer: &Tracer, between: &[u32], e: &mut Evaluation) -> f64 {
-        if between.len() <= MOST_EXACT_OCCLUDERS {
+        if between.len() <= e.precision.exact_occluders {
             let parts =
                 ConvexParts { parts: &self.parts, normal: self.frame.normal, origin: self.frame.origin };
             let occluders = between.iter().map(|&t| &tracer.triangles()[t as usize]);
@@ -127,10 +145,11 @@ impl AreaEmitter {
     /// The kernel-weighted fraction of sample points in sight.
     fn fraction_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, e: &mut Evaluation) -> f64 {
         let (mut seen, mut all) = (0.0, 0.0);
+        let most = e.precision.rays_a_side;
         let whole: f64 = self.parts.iter().map(|p| fan_area(p)).sum();
         for part in &self.parts {
             let share = fan_area(part) / whole;
-            let side = ((f64::from(RAYS_A_SIDE) * share.sqrt()).ceil() as u32).clamp(1, RAYS_A_SIDE);
+            let side = ((f64::from(most) * share.sqrt()).ceil() as u32).clamp(1, most);
             let area = share / f64::from(side * side);
             for k in 0..side * side {
                 let u = (f64::from(k % side) + 0.5) / f64::from(side);
@@ -353,7 +372,7 @@ mod tests {
         let blocker = [DVec3::new(-0.4, -3.0, 1.0), DVec3::new(0.1, 3.0, 1.0), DVec3::new(-3.0, 0.0, 1.2)];
         let tracer = Tracer::new(vec![blocker]);
         let lamp = lamp();
-        let mut e = Evaluation::default();
+        let mut e = Evaluation::new(Precision::EMITTER);
         for x in [-0.6, 0.0, 0.3, 0.6] {
             let exact = lamp.visible(floor_point(x), &tracer, &[0], &mut e);
             let rays = lamp.unoccluded(floor_point(x)) * lamp.fraction_by_rays(floor_point(x), &tracer, &mut e);

@@ -1,4 +1,203 @@
 //! Stage 4: light is shot until little is left.
+//!
+//! In the order of progressive refinement: glowing surfaces shoot, strongest first, then
+//! punctual lights, both onto elements that split where their shadows fall ([`direct`]).
+//! Then patches shoot what they reflect among each other ([`patches`]), the one with the
+//! most unshot power first, until the unshot power is a small fraction of the emitted; and
+//! what each sent is delivered once to the elements ([`deliver`]).
+
+pub mod deliver;
+pub mod direct;
 pub mod emitter;
 pub mod form_factor;
+pub mod patches;
+pub mod shooters;
+pub mod umbra;
 pub mod visible;
+
+use glam::DVec3;
+
+use crate::element::{Appearance, Facet, Side};
+use crate::light::luminance;
+use crate::options::BakeOptions;
+use crate::scene::PunctualLight;
+use crate::surface::Surface;
+use crate::trace::Tracer;
+use deliver::{DeliveryCounts, deliver, spread_kept};
+use direct::{DirectPass, ShotCounts};
+use emitter::{AreaEmitter, Emitter};
+use patches::{Energy, Patches};
+use umbra::Occluders;
+
+/// What the solver works on.
+pub struct Problem<'a> {
+    /// The scene's triangles.
+    pub tracer: &'a Tracer,
+    /// The surfaces that the facets lie on.
+    pub surfaces: &'a [Surface],
+    /// Reflectances of new elements.
+    pub appearance: &'a (dyn Appearance + Sync),
+    /// Lights without extent.
+    pub lights: &'a [PunctualLight],
+    /// The caller's options.
+    pub options: &'a BakeOptions,
+    /// Longest side of a patch, metres.
+    pub patch_size: f64,
+    /// Elements no larger than this are not split, metres.
+    pub threshold: f64,
+}
+
+/// Light in balance.
+pub struct Solution {
+    /// Facets with what their elements received.
+    pub facets: Vec<Facet>,
+    /// What shot first, in the order in which it did.
+    pub emitters: Vec<Emitter>,
+    /// Convex outlines of what occludes.
+    pub occluders: Occluders,
+    /// Where the light went.
+    pub energy: Energy,
+    /// Shots by emitters, lights and patches.
+    pub shots: u64,
+    /// Rays of all kinds.
+    pub rays: u64,
+    /// What the direct pass did.
+    pub direct: ShotCounts,
+    /// What delivering reflected light did.
+    pub delivery: DeliveryCounts,
+}
+
+/// Solves for the light on `facets`.
+///
+/// `progress` is told the fraction done and says whether to go on; `None` when it said stop.
+pub fn solve(
+    problem: &Problem,
+    mut facets: Vec<Facet>,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Option<Solution> {
+    let tracer = problem.tracer;
+    let (glowing, lights) = emitters(problem, &facets);
+    let occluders = Occluders::new(problem.surfaces, tracer.triangles().len());
+    let mut pass = DirectPass {
+        tracer,
+        occluders: &occluders,
+        appearance: problem.appearance,
+        options: problem.options,
+        threshold: problem.threshold,
+        typical: typical_irradiance(&glowing, &lights, &facets, tracer.diagonal()),
+    };
+    let mut direct = ShotCounts::default();
+    let mut patches = Patches::new(&facets, problem.patch_size, tracer);
+    let count = glowing.len() + lights.len();
+    let mut before = mean_direct(&patches, &facets);
+    for (i, emitter) in glowing.iter().chain(&lights).enumerate() {
+        if i == glowing.len() {
+            let after = mean_direct(&patches, &facets);
+            patches.receive_from_surfaces(&facets, &after);
+            before = after;
+        }
+        direct.add(&pass.shoot(emitter, &mut facets));
+        if !progress(0.4 * (i + 1) as f64 / count as f64) {
+            return None;
+        }
+    }
+    let after = mean_direct(&patches, &facets);
+    if lights.is_empty() {
+        patches.receive_from_surfaces(&facets, &after);
+    } else {
+        let received: Vec<DVec3> = after.iter().zip(&before).map(|(a, b)| *a - *b).collect();
+        patches.receive_from_lights(&received);
+    }
+    shoot_patches(&mut patches, problem, progress)?;
+    pass.typical = patches.mean_irradiance();
+    let delivery = deliver(&pass, &patches, &mut facets);
+    spread_kept(&patches, &mut facets, tracer.diagonal() * 1e-6);
+    progress(1.0);
+    let emitters: Vec<Emitter> = glowing.into_iter().chain(lights).collect();
+    Some(Solution {
+        facets,
+        energy: patches.energy,
+        shots: emitters.len() as u64 + patches.shots,
+        rays: patches.rays + direct.effort.rays + delivery.effort.rays,
+        emitters,
+        occluders,
+        direct,
+        delivery,
+    })
+}
+
+/// Glowing regions and punctual lights, each the strongest first; ties keep the scene's order.
+fn emitters(problem: &Problem, facets: &[Facet]) -> (Vec<Emitter>, Vec<Emitter>) {
+    let mut glowing = Vec::new();
+    for facet in facets.iter().filter(|f| f.exitance.max_element() > 0.0) {
+        let region = &problem.surfaces[facet.surface].regions[facet.region];
+        let triangles: Vec<_> = match facet.side {
+            Side::Front => region.triangles.clone(),
+            Side::Back => region.triangles.iter().map(|t| [t[0], t[2], t[1]].map(|p| facet.from_surface_plane(p))).collect(),
+        };
+        glowing.push(Emitter::Area(AreaEmitter::new(
+            facet.frame,
+            &facet.rings,
+            &clipped_triangles(&triangles, facet),
+            facet.exitance,
+        )));
+    }
+    let mut lights: Vec<Emitter> = problem.lights.iter().map(|&l| Emitter::Punctual(l)).collect();
+    let diagonal = problem.tracer.diagonal();
+    let power = |e: &Emitter| luminance(e.power(diagonal));
+    for list in [&mut glowing, &mut lights] {
+        list.sort_by(|a, b| power(b).total_cmp(&power(a)));
+    }
+    (glowing, lights)
+}
+
+/// The region's triangles inside the facet's tile, as fans.
+fn clipped_triangles(triangles: &[[glam::DVec2; 3]], facet: &Facet) -> Vec<[glam::DVec2; 3]> {
+    let root = &facet.elements[0];
+    triangles
+        .iter()
+        .flat_map(|t| {
+            let ring = crate::geom::polygon::clip_rectangle(t, root.min, root.max);
+            (1..ring.len().saturating_sub(1)).map(|i| [ring[0], ring[i], ring[i + 1]]).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// The mean irradiance if all power fell evenly onto all facets.
+fn typical_irradiance(glowing: &[Emitter], lights: &[Emitter], facets: &[Facet], diagonal: f64) -> f64 {
+    let area: f64 = facets.iter().map(|f| f.elements[0].area).sum();
+    let power: f64 = glowing.iter().map(|e| luminance(e.power(diagonal))).sum();
+    let from_lights: f64 = lights
+        .iter()
+        .map(|e| match e.facing() {
+            Some(_) => 0.0,
+            None => luminance(e.power(diagonal)).min(luminance(e.power(area.sqrt()))),
+        })
+        .sum();
+    0.25 * (power + from_lights) / area.max(f64::MIN_POSITIVE)
+}
+
+/// Direct irradiance of each patch as its elements have it.
+fn mean_direct(patches: &Patches, facets: &[Facet]) -> Vec<DVec3> {
+    patches.patches.iter().map(|p| facets[p.facet as usize].mean_direct(p.element)).collect()
+}
+
+/// Shots until the unshot power is small; `None` when told to stop.
+fn shoot_patches(patches: &mut Patches, problem: &Problem, progress: &mut dyn FnMut(f64) -> bool) -> Option<()> {
+    let at_first = patches.unshot_power().element_sum();
+    let enough = patches.energy.emitted.element_sum() * problem.options.unshot_fraction;
+    loop {
+        let left = patches.unshot_power().element_sum();
+        // The logarithm falls evenly, since each round of shots absorbs about the same share.
+        let done = (at_first / left).ln() / (at_first / enough).ln();
+        if left <= enough || !progress(0.4 + 0.3 * done.clamp(0.0, 1.0)) {
+            break if left <= enough { Some(()) } else { None };
+        }
+        if patches.shoot(problem.tracer).is_none() {
+            break Some(());
+        }
+        patches.energy.unshot = patches.unshot_power();
+    }?;
+    patches.energy.unshot = patches.unshot_power();
+    Some(())
+}

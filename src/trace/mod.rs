@@ -41,6 +41,8 @@ pub struct Tracer {
     /// In the order of `rays.primitive_indices`.
     ordered: Vec<Facing>,
     triangles: Vec<[DVec3; 3]>,
+    /// Empty where no triangle is double-sided.
+    double_sided: Vec<bool>,
     centre: DVec3,
     diagonal: f64,
 }
@@ -88,7 +90,20 @@ impl Tracer {
                 Facing { corner, edge1: local(t[1]) - corner, edge2: local(t[2]) - corner }
             })
             .collect();
-        Self { rays, boxes, ordered, triangles, centre, diagonal: bounds.diagonal() }
+        let double_sided = Vec::new();
+        Self { rays, boxes, ordered, triangles, double_sided, centre, diagonal: bounds.diagonal() }
+    }
+
+    /// Marks the triangles whose backs are surfaces like their fronts, in the order given to [`new`](Self::new).
+    #[must_use]
+    pub fn with_double_sided(self, double_sided: Vec<bool>) -> Self {
+        Self { double_sided, ..self }
+    }
+
+    /// Whether a triangle's back reflects and emits as its front does.
+    #[must_use]
+    pub fn is_double_sided(&self, triangle: usize) -> bool {
+        self.double_sided.get(triangle).copied().unwrap_or(false)
     }
 
     /// The triangles as they were given.

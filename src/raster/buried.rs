@@ -1,0 +1,46 @@
+//! Which regions lie under or inside a solid.
+//!
+//! A floor under a box is never seen, and a texel there must not lend its darkness to its
+//! neighbours. From inside a solid one sees the backs of its single-sided faces.
+
+use glam::DVec3;
+
+use crate::geom::{Frame, triangle};
+use crate::surface::{Region, Surface};
+use crate::trace::Tracer;
+
+/// This many of a region's largest triangles are looked from.
+const VANTAGE_POINTS: usize = 3;
+
+/// Directions looked along from each.
+const DIRECTIONS: u32 = 16;
+
+/// Whether most of what a region sees are backs.
+#[must_use]
+pub fn is_buried(surface: &Surface, region: &Region, tracer: &Tracer) -> bool {
+    let mut largest: Vec<_> = region.triangles.iter().collect();
+    let area = |t: &&[glam::DVec2; 3]| triangle::area(t.map(|p| p.extend(0.0)));
+    largest.sort_by(|a, b| area(b).total_cmp(&area(a)));
+    let (mut backs, mut all) = (0_u32, 0_u32);
+    for t in largest.into_iter().take(VANTAGE_POINTS) {
+        let centre = surface.frame.lift((t[0] + t[1] + t[2]) / 3.0);
+        let from = centre + surface.frame.normal * tracer.margin();
+        let frame = Frame::new(from, surface.frame.normal, surface.frame.u);
+        for k in 0..DIRECTIONS {
+            let direction = cosine_direction(&frame, k);
+            all += 1;
+            if let Some(hit) = tracer.closest_hit(from, direction) {
+                backs += u32::from(hit.from_behind && !tracer.is_double_sided(hit.triangle));
+            }
+        }
+    }
+    2 * backs > all
+}
+
+/// The `k`-th of [`DIRECTIONS`] directions, cosine-distributed on a golden spiral.
+fn cosine_direction(frame: &Frame, k: u32) -> DVec3 {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let v = (f64::from(k) + 0.5) / f64::from(DIRECTIONS);
+    let (sin, cos) = (std::f64::consts::TAU * GOLDEN * f64::from(k)).sin_cos();
+    v.sqrt() * (cos * frame.u + sin * frame.v) + (1.0 - v).sqrt() * frame.normal
+}

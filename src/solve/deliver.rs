@@ -1,0 +1,270 @@
+//! What the patches send in the end reaches the elements.
+//!
+//! Each patch delivers once, all that it reflected, strongest first. A weak delivery was
+//! found well enough when the patches exchanged light, and the receiving patch keeps it. A
+//! strong one is evaluated anew in the receiver's samples: closed form times visibility,
+//! with the parts of a near shooter sending each their own radiosity, and the parts of a
+//! near receiver receiving in its place. So elements arise only where light changes within
+//! them.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::direct::DirectPass;
+use super::emitter::{Between, Effort, Evaluation, Precision};
+use super::form_factor::{point_to_disk, point_to_polygon};
+use super::patches::Patches;
+use super::shooters::{Shooter, Shooters};
+use crate::element::{Element, Facet, NONE, Side};
+use crate::light::luminance;
+use crate::options::Refine;
+
+/// A delivery whose change across the receiving patch is below this fraction of the light there is weak.
+const WEAK: f64 = 3e-4;
+
+/// The error in an element's middle that a delivery may leave, as a fraction of the light there.
+const TOLERANCE: f64 = 2e-3;
+
+/// What delivering took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DeliveryCounts {
+    /// Pairs that kept what the patches had exchanged.
+    pub weak: u64,
+    /// Elements that received a strong delivery.
+    pub strong: u64,
+    /// Splits for the sake of indirect light.
+    pub splits: u64,
+    /// Evaluations and rays.
+    pub effort: Effort,
+}
+
+impl DeliveryCounts {
+    fn add(&mut self, other: &Self) {
+        self.weak += other.weak;
+        self.strong += other.strong;
+        self.splits += other.splits;
+        self.effort.add(other.effort);
+    }
+}
+
+/// Delivers what all patches send to all facets.
+pub fn deliver(pass: &DirectPass, patches: &Patches, facets: &mut [Facet]) -> DeliveryCounts {
+    let shooters = Shooters::new(facets, patches);
+    // Patches come in the order of facets, so each facet's are consecutive.
+    let mut first_of_facet = vec![0; facets.len() + 1];
+    for patch in &patches.patches {
+        first_of_facet[patch.facet as usize + 1] += 1;
+    }
+    for i in 1..first_of_facet.len() {
+        first_of_facet[i] += first_of_facet[i - 1];
+    }
+    let typical = patches.mean_irradiance();
+    let counts: Vec<DeliveryCounts> = facets
+        .par_iter_mut()
+        .enumerate()
+        .map(|(index, facet)| {
+            let mut delivery = Delivery {
+                pass,
+                shooters: &shooters,
+                values: vec![(NONE, DVec3::ZERO); facet.samples.len()],
+                facet,
+                typical,
+                reference: typical,
+                evaluation: Evaluation::new(Precision::REFLECTOR),
+                counts: DeliveryCounts::default(),
+            };
+            delivery.receive_all(patches, first_of_facet[index]..first_of_facet[index + 1]);
+            delivery.counts.effort = delivery.evaluation.effort;
+            delivery.counts
+        })
+        .collect();
+    let mut total = DeliveryCounts::default();
+    counts.iter().for_each(|c| total.add(c));
+    total
+}
+
+struct Delivery<'a> {
+    pass: &'a DirectPass<'a>,
+    shooters: &'a Shooters,
+    facet: &'a mut Facet,
+    /// The last shooter asked in each sample, and its irradiance there.
+    values: Vec<(u32, DVec3)>,
+    typical: f64,
+    /// What errors are measured by in the present patch.
+    reference: f64,
+    evaluation: Evaluation,
+    counts: DeliveryCounts,
+}
+
+impl Delivery<'_> {
+    fn receive_all(&mut self, patches: &Patches, own: std::ops::Range<usize>) {
+        let mut kept = vec![DVec3::ZERO; own.len()];
+        for (sender, patch) in patches.patches.iter().enumerate() {
+            let root = self.shooters.of_patch(sender);
+            let shooter = &self.shooters.all[root as usize];
+            if luminance(shooter.radiosity) <= 0.0 {
+                continue;
+            }
+            for (receiver, kept) in own.clone().zip(&mut kept) {
+                let to = &patches.patches[receiver];
+                let d = patch.centre.position - to.centre.position;
+                if to.centre.normal.dot(d) <= -patch.radius
+                    || -patch.centre.normal.dot(d) <= -to.radius
+                    || receiver == sender
+                {
+                    continue;
+                }
+                self.reference = self.typical.max(luminance(to.direct + to.indirect));
+                let known = patches.factor(sender, receiver);
+                let distance = d.length();
+                let most = (patch.area / (std::f64::consts::PI * distance * distance)).min(1.0).max(known);
+                let change = (2.0 * to.radius / distance).min(1.0);
+                if luminance(shooter.radiosity) * most * change < WEAK * self.reference {
+                    *kept += shooter.radiosity * known;
+                    self.counts.weak += 1;
+                } else {
+                    self.receive(to.element, root, None);
+                }
+            }
+        }
+        for (receiver, kept) in own.zip(kept) {
+            let element = &mut self.facet.elements[patches.patches[receiver].element as usize];
+            element.kept = kept;
+        }
+    }
+
+    /// `inherited` holds what stands between the element's parent or the shooter's parent.
+    fn receive(&mut self, element: u32, shooter: u32, inherited: Option<&[u32]>) {
+        let tracer = self.pass.tracer;
+        let s = &self.shooters.all[shooter as usize];
+        if luminance(s.radiosity) <= 0.0 {
+            return;
+        }
+        let hull = self.facet.hull(element);
+        let emitter = &s.emitter;
+        if emitter.is_behind(&hull, self.facet.frame.normal, tracer.margin()) {
+            return;
+        }
+        let mut between = Vec::new();
+        if inherited.is_none_or(|list| !list.is_empty()) {
+            let shaft = emitter.shaft(&hull, tracer);
+            match inherited {
+                None => shaft.gather(tracer, &mut between),
+                Some(list) => shaft.filter(tracer, list, &mut between),
+            }
+        }
+        if !between.is_empty() && self.pass.occluders.one_hides(&hull, emitter, tracer, &between) {
+            return;
+        }
+        let e = &self.facet.elements[element as usize];
+        let centre = self.facet.centre(element);
+        let to_shooter = s.centre - centre.position;
+        let half = 0.5 * (e.max - e.min).length();
+        let gap = (to_shooter.length() - 0.5 * s.radius).max(0.25 * to_shooter.length());
+        let near = (half / gap).min(1.0);
+        let factor = if s.area < 0.02 * gap * gap {
+            point_to_disk(centre, s.centre, s.normal, s.area)
+        } else {
+            point_to_polygon(centre, &s.hull)
+        };
+        let light = luminance(s.radiosity) * factor.max(s.area / (std::f64::consts::PI * gap * gap) * 0.1);
+        if s.spread * factor.max(0.05 * near) > TOLERANCE * self.reference && !s.is_leaf() {
+            for part in s.parts {
+                if part != NONE {
+                    self.receive(element, part, Some(&between));
+                }
+            }
+            return;
+        }
+        let mut change = near * near * 0.5;
+        if !between.is_empty() {
+            change = change.max(0.25 * near.max(0.3));
+        }
+        let wants_parts = light * change > TOLERANCE * self.reference;
+        if wants_parts && self.part(element) {
+            for child in self.facet.elements[element as usize].children {
+                if child != NONE {
+                    self.receive(child, shooter, Some(&between));
+                }
+            }
+            return;
+        }
+        self.take(element, shooter, &between);
+    }
+
+    /// Whether the element has parts now.
+    fn part(&mut self, element: u32) -> bool {
+        let e = &self.facet.elements[element as usize];
+        if !e.is_leaf() {
+            return true;
+        }
+        let may = match self.pass.options.refine {
+            Refine::None | Refine::Uniform | Refine::Cob => false,
+            Refine::Gradient | Refine::CobGradient => e.size() > 2.0 * self.pass.threshold,
+        };
+        if may && self.facet.split(element, self.pass.appearance) {
+            self.values.resize(self.facet.samples.len(), (NONE, DVec3::ZERO));
+            self.counts.splits += 1;
+            return true;
+        }
+        false
+    }
+
+    fn take(&mut self, element: u32, shooter: u32, between: &[u32]) {
+        self.counts.strong += 1;
+        let samples = self.facet.elements[element as usize].samples;
+        let values = samples.map(|sample| self.value(sample, shooter, between));
+        let e = &mut self.facet.elements[element as usize];
+        let corners = e.corner_values(values);
+        for (sum, value) in e.indirect.iter_mut().zip(corners) {
+            *sum += value;
+        }
+    }
+
+    fn value(&mut self, sample: u32, shooter: u32, between: &[u32]) -> DVec3 {
+        let (known, value) = self.values[sample as usize];
+        if known == shooter {
+            return value;
+        }
+        let s: &Shooter = &self.shooters.all[shooter as usize];
+        let point = self.facet.samples[sample as usize].point;
+        let between = if between.is_empty() { Between::Nothing } else { Between::Triangles(between) };
+        let value = s.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation);
+        self.values[sample as usize] = (shooter, value);
+        value
+    }
+}
+
+/// Spreads what patches kept over their corners: a corner takes the mean of the patches of its region that
+/// meet there, so that the light is continuous where it was constant.
+pub fn spread_kept(patches: &Patches, facets: &mut [Facet], grain: f64) {
+    let key = |facet: &Facet, corner: DVec2| {
+        let cell = (facet.frame.lift(corner) / grain).round().as_i64vec3();
+        (facet.surface, facet.region, facet.side == Side::Front, cell.to_array())
+    };
+    let corners = |e: &Element| {
+        [e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)]
+    };
+    let mut sums: HashMap<_, (DVec3, f64)> = HashMap::new();
+    for patch in &patches.patches {
+        let facet = &facets[patch.facet as usize];
+        let e = &facet.elements[patch.element as usize];
+        for corner in corners(e) {
+            let (sum, weight) = sums.entry(key(facet, corner)).or_default();
+            *sum += e.kept * e.area;
+            *weight += e.area;
+        }
+    }
+    for patch in &patches.patches {
+        let facet = &mut facets[patch.facet as usize];
+        let at = corners(&facet.elements[patch.element as usize]).map(|c| key(facet, c));
+        let e = &mut facet.elements[patch.element as usize];
+        for (value, key) in e.indirect.iter_mut().zip(at) {
+            if let Some(&(sum, weight)) = sums.get(&key) {
+                *value += sum / weight;
+            }
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! Emitters and lights shoot; elements receive, and split where their shadows fall.
+//!
+//! For each element and shooter: what stands in the shaft between them is handed down from
+//! the parent element and filtered. Nothing there: closed form without a ray. One occluder
+//! that hides everything: nothing arrives. Else the visible part of the emitter is found
+//! sample by sample. Before that, the refinement policies say whether the element's parts
+//! shall receive in its place:
+//!
+//! - the Close Objects Buffer, a priori, as in the paper: the shot is strong (eq. 1) and
+//!   something close may shade the element;
+//! - gradient, a posteriori: the value in the middle differs from the interpolation.
+
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::emitter::{Between, Effort, Emitter, Evaluation, Precision};
+use super::form_factor::point_to_disk;
+use super::umbra::Occluders;
+use crate::cob::{Cob, CobState, Prism, prism_height};
+use crate::element::{Appearance, Facet, NONE};
+use crate::light::luminance;
+use crate::options::{BakeOptions, Refine, Toggle};
+use crate::trace::Tracer;
+
+/// A value in an element's middle that differs from the interpolation by more than this fraction of the
+/// light there calls for a split.
+const GRADIENT_TOLERANCE: f64 = 0.04;
+
+/// Reflectance below which the paper's criterion would no longer see a shot that the lightmap still holds.
+const LEAST_REFLECTANCE: f64 = 0.1;
+
+/// What the direct pass needs to know.
+pub struct DirectPass<'a> {
+    /// The scene's triangles.
+    pub tracer: &'a Tracer,
+    /// Their convex outlines.
+    pub occluders: &'a Occluders,
+    /// Reflectances of new elements.
+    pub appearance: &'a (dyn Appearance + Sync),
+    /// The caller's options.
+    pub options: &'a BakeOptions,
+    /// Elements no larger than this are not split, metres.
+    pub threshold: f64,
+    /// Mean irradiance that the emitters would give if they shone evenly: what counts as dim.
+    pub typical: f64,
+}
+
+/// What a shot did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ShotCounts {
+    /// Splits by the Close Objects Buffer.
+    pub cob_splits: u64,
+    /// Splits by the gradient.
+    pub gradient_splits: u64,
+    /// Splits by the uniform policy.
+    pub uniform_splits: u64,
+    /// Splits that did not happen since no close object touches the shaft.
+    pub saved_by_shaft: u64,
+    /// Splits that did not happen since one occluder hides everything.
+    pub saved_by_umbra: u64,
+    /// Time spent in Close Objects Buffers, summed over threads.
+    pub cob_time: Duration,
+    /// Evaluations and rays.
+    pub effort: Effort,
+}
+
+impl ShotCounts {
+    /// Adds another shot's counts.
+    pub fn add(&mut self, other: &Self) {
+        self.cob_splits += other.cob_splits;
+        self.gradient_splits += other.gradient_splits;
+        self.uniform_splits += other.uniform_splits;
+        self.saved_by_shaft += other.saved_by_shaft;
+        self.saved_by_umbra += other.saved_by_umbra;
+        self.cob_time += other.cob_time;
+        self.effort.add(other.effort);
+    }
+}
+
+impl DirectPass<'_> {
+    /// Lets one emitter shoot onto all facets.
+    pub fn shoot(&self, emitter: &Emitter, facets: &mut [Facet]) -> ShotCounts {
+        let counts: Vec<ShotCounts> = facets
+            .par_iter_mut()
+            .map(|facet| {
+                let mut receiving = Receiving::new(self, emitter, facet);
+                receiving.receive(0, None);
+                receiving.counts.effort = receiving.evaluation.effort;
+                receiving.counts
+            })
+            .collect();
+        let mut total = ShotCounts::default();
+        counts.iter().for_each(|c| total.add(c));
+        total
+    }
+}
+
+/// One facet receiving one shot.
+struct Receiving<'a> {
+    pass: &'a DirectPass<'a>,
+    emitter: &'a Emitter,
+    facet: &'a mut Facet,
+    /// The shot's irradiance in each sample that was asked for.
+    values: Vec<Option<DVec3>>,
+    evaluation: Evaluation,
+    counts: ShotCounts,
+}
+
+impl<'a> Receiving<'a> {
+    fn new(pass: &'a DirectPass<'a>, emitter: &'a Emitter, facet: &'a mut Facet) -> Self {
+        let values = vec![None; facet.samples.len()];
+        Self {
+            pass,
+            emitter,
+            facet,
+            values,
+            evaluation: Evaluation::new(Precision::EMITTER),
+            counts: ShotCounts::default(),
+        }
+    }
+
+    /// `inherited` holds what stands in the parent's shaft.
+    fn receive(&mut self, element: u32, inherited: Option<&[u32]>) {
+        let tracer = self.pass.tracer;
+        let hull = self.facet.hull(element);
+        if self.emitter.is_behind(&hull, self.facet.frame.normal, tracer.margin()) {
+            return;
+        }
+        let mut between = Vec::new();
+        if inherited.is_none_or(|list| !list.is_empty()) {
+            let shaft = self.emitter.shaft(&hull, tracer);
+            match inherited {
+                None => shaft.gather(tracer, &mut between),
+                Some(list) => shaft.filter(tracer, list, &mut between),
+            }
+        }
+        let is_umbra = self.pass.options.umbra_test == Toggle::On
+            && !between.is_empty()
+            && self.pass.occluders.one_hides(&hull, self.emitter, tracer, &between);
+        if !self.facet.elements[element as usize].is_leaf() {
+            if !is_umbra {
+                self.receive_in_parts(element, &between);
+            }
+            return;
+        }
+        if self.should_split(element, &hull, &between, is_umbra)
+            && self.facet.split(element, self.pass.appearance)
+        {
+            self.values.resize(self.facet.samples.len(), None);
+            self.receive_in_parts(element, &between);
+        } else if !is_umbra {
+            let values = self.facet.elements[element as usize].samples.map(|s| self.value(s, &between));
+            let e = &mut self.facet.elements[element as usize];
+            let corners = e.corner_values(values);
+            for (sum, value) in e.direct.iter_mut().zip(corners) {
+                *sum += value;
+            }
+        }
+    }
+
+    fn receive_in_parts(&mut self, element: u32, between: &[u32]) {
+        for child in self.facet.elements[element as usize].children {
+            if child != NONE {
+                self.receive(child, Some(between));
+            }
+        }
+    }
+
+    fn should_split(&mut self, element: u32, hull: &[DVec3], between: &[u32], is_umbra: bool) -> bool {
+        let options = self.pass.options;
+        if self.facet.elements[element as usize].size() <= self.pass.threshold {
+            return false;
+        }
+        match options.refine {
+            Refine::None => return false,
+            Refine::Uniform => {
+                self.counts.uniform_splits += 1;
+                return true;
+            }
+            Refine::Cob | Refine::CobGradient => {
+                if self.close_shadow(element, hull, between) {
+                    if is_umbra {
+                        self.counts.saved_by_umbra += 1;
+                    } else {
+                        self.counts.cob_splits += 1;
+                        return true;
+                    }
+                }
+            }
+            Refine::Gradient => {}
+        }
+        if options.refine == Refine::Cob || is_umbra || !self.gradient_is_steep(element, between) {
+            return false;
+        }
+        self.counts.gradient_splits += 1;
+        true
+    }
+
+    /// The paper's criterion: a strong shot, and something close that may shade it.
+    fn close_shadow(&mut self, element: u32, hull: &[DVec3], between: &[u32]) -> bool {
+        if !self.is_strong(element) {
+            return false;
+        }
+        let begin = Instant::now();
+        let cob = self.cob(element, hull);
+        let entries = self.facet.cobs.entries(cob);
+        // Both lists ascend.
+        let counts = self.pass.options.shaft_test == Toggle::Off
+            || entries.iter().any(|t| between.binary_search(t).is_ok());
+        let is_empty = entries.is_empty();
+        self.counts.cob_time += begin.elapsed();
+        if !is_empty && !counts {
+            self.counts.saved_by_shaft += 1;
+        }
+        !is_empty && counts
+    }
+
+    /// Eq. 1: `M` times the shooter's radiosity against a fraction of the receiver's own.
+    fn is_strong(&self, element: u32) -> bool {
+        let e = &self.facet.elements[element as usize];
+        let centre = self.facet.centre(element);
+        let diagonal = self.pass.tracer.diagonal();
+        let arriving = match self.emitter.facing() {
+            Some((normal, area, exitance)) => {
+                exitance * point_to_disk(centre, self.emitter.centre(centre.position, diagonal), normal, area)
+            }
+            None => self.emitter.irradiance(
+                centre,
+                self.pass.tracer,
+                Between::Nothing,
+                &mut Evaluation::new(Precision::EMITTER),
+            ),
+        };
+        let reflectance = e.reflectance.max(DVec3::splat(LEAST_REFLECTANCE));
+        let (direct, indirect) = self.facet.received(element, e.centroid);
+        let present = self.facet.exitance + reflectance * (direct + indirect);
+        (reflectance * arriving).element_sum()
+            > self.pass.options.illumination_threshold * present.element_sum()
+    }
+
+    /// The element's buffer, filled if it was not.
+    fn cob(&mut self, element: u32, hull: &[DVec3]) -> Cob {
+        let e = &self.facet.elements[element as usize];
+        if e.cob.state() != CobState::Uninitialized {
+            return e.cob;
+        }
+        let parent =
+            if e.parent == NONE { Cob::UNINITIALIZED } else { self.facet.elements[e.parent as usize].cob };
+        let height = prism_height(self.pass.options.cob_height, e.size());
+        let tracer = self.pass.tracer;
+        let prism = Prism::over(hull, self.facet.frame.normal, height, tracer.margin() * 0.5);
+        let cob = self.facet.cobs.fill(&prism, parent, tracer);
+        self.facet.elements[element as usize].cob = cob;
+        cob
+    }
+
+    fn gradient_is_steep(&mut self, element: u32, between: &[u32]) -> bool {
+        let samples = self.facet.elements[element as usize].samples;
+        let values = samples.map(|s| self.value(s, between));
+        let centre = self.facet.centre(element);
+        let middle = self.evaluate(centre, between);
+        let e = &self.facet.elements[element as usize];
+        let interpolated = e.interpolate(&e.corner_values(values), e.centroid);
+        let (direct, _) = self.facet.received(element, e.centroid);
+        let light = luminance(direct) + luminance(middle.max(interpolated));
+        let allowed = GRADIENT_TOLERANCE * light.max(self.pass.typical);
+        let spread = values.iter().map(|&v| luminance((v - middle).abs())).fold(0.0, f64::max);
+        luminance((middle - interpolated).abs()) > allowed
+            || (!between.is_empty() && spread > SHADOW_SPREAD * light.max(self.pass.typical))
+    }
+
+    fn value(&mut self, sample: u32, between: &[u32]) -> DVec3 {
+        if let Some(value) = self.values[sample as usize] {
+            return value;
+        }
+        let value = self.evaluate(self.facet.samples[sample as usize].point, between);
+        self.values[sample as usize] = Some(value);
+        value
+    }
+
+    fn evaluate(&mut self, point: super::form_factor::SurfacePoint, between: &[u32]) -> DVec3 {
+        let between = if between.is_empty() { Between::Nothing } else { Between::Triangles(between) };
+        self.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation)
+    }
+}
+
+/// Where occluders are about, corners may differ from the middle by this fraction of the light before the
+/// element is split: the interpolation of a shadow's edge can be right in the middle by chance.
+const SHADOW_SPREAD: f64 = 0.25;
