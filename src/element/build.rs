@@ -34,7 +34,7 @@ pub struct MeshOptions {
 }
 
 /// What a surface's material does: needed for each element.
-pub trait Appearance {
+pub trait SurfaceAppearance {
     /// Mean reflectance over a rectangle of a surface, in that surface's plane coordinates.
     fn reflectance(&self, surface: usize, min: DVec2, max: DVec2) -> DVec3;
     /// Mean exitance `π L` likewise.
@@ -43,7 +43,7 @@ pub trait Appearance {
 
 /// Lays facets over all regions and splits them into patches.
 #[must_use]
-pub fn build(surfaces: &[Surface], appearance: &dyn Appearance, options: MeshOptions) -> Vec<Facet> {
+pub fn build(surfaces: &[Surface], appearance: &dyn SurfaceAppearance, options: MeshOptions) -> Vec<Facet> {
     let mut facets = Vec::new();
     for (index, surface) in surfaces.iter().enumerate() {
         for (region_index, region) in surface.regions.iter().enumerate() {
@@ -129,7 +129,7 @@ fn area_and_centroid(rings: &[Ring]) -> (f64, DVec2) {
 }
 
 impl Facet {
-    fn plant(&mut self, appearance: &dyn Appearance) {
+    fn plant(&mut self, appearance: &dyn SurfaceAppearance) {
         let (min, max) = self
             .rings
             .iter()
@@ -139,7 +139,7 @@ impl Facet {
         self.add_element(NONE, (min, max), [0, 0, FINEST, FINEST], &rings, appearance);
     }
 
-    fn split_to(&mut self, patch_size: f64, appearance: &dyn Appearance) {
+    fn split_to(&mut self, patch_size: f64, appearance: &dyn SurfaceAppearance) {
         let mut next = 0;
         while next < self.elements.len() {
             if self.elements[next].size() > patch_size * (1.0 + 1e-9) {
@@ -152,7 +152,7 @@ impl Facet {
     /// Splits a leaf into halves along its longer side, or into quarters where it is about square.
     ///
     /// Whether there are parts now: an element at the finest division stays whole.
-    pub fn split(&mut self, element: u32, appearance: &dyn Appearance) -> bool {
+    pub fn split(&mut self, element: u32, appearance: &dyn SurfaceAppearance) -> bool {
         let e = &self.elements[element as usize];
         if !e.is_leaf() {
             return true;
@@ -198,7 +198,7 @@ impl Facet {
         (min, max): (DVec2, DVec2),
         cell: [u32; 4],
         rings: &[Ring],
-        appearance: &dyn Appearance,
+        appearance: &dyn SurfaceAppearance,
     ) -> Option<u32> {
         let rings = clip_rings(rings, min, max);
         let (area, centroid) = area_and_centroid(&rings);

@@ -10,13 +10,15 @@
 //! at a point is the sum over the elements of the tree that contain it. A weak shot is
 //! received by a coarse element and costs four samples, a strong one by many fine ones.
 
+mod appearance;
 mod build;
 mod facet;
 mod sampling;
 
 use glam::{DVec2, DVec3};
 
-pub use build::{Appearance, MeshOptions, build};
+pub use appearance::SceneAppearance;
+pub use build::{SurfaceAppearance, MeshOptions, build};
 pub use facet::{Facet, Sample, Side};
 
 use crate::cob::Cob;

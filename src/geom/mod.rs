@@ -4,6 +4,7 @@ pub mod frame;
 pub mod hull;
 pub mod polygon;
 pub mod triangle;
+pub mod triangle_grid;
 
 pub use bounds::Bounds;
 pub use frame::Frame;

@@ -1,8 +1,31 @@
 //! Stage 7: from charts and the radiosity mesh to texels.
+//!
+//! Every texel that a bilinear lookup inside a chart can touch is evaluated at a point of its
+//! own chart and outside of any solid that stands there; the rest of the padding is filled
+//! from it.
 
 pub mod buried;
+pub mod coverage;
+pub mod dilate;
 pub mod direct;
 pub mod locate;
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::element::SurfaceAppearance;
+use crate::options::{BakeOptions, Direct, Quantity};
+use crate::retriangulate::RadiosityMesh;
+use crate::solve::emitter::{Effort, Emitter};
+use crate::solve::umbra::Occluders;
+use crate::surface::Surface;
+use crate::trace::Tracer;
+use crate::unwrap::Atlas;
+use coverage::TexelSite;
+use direct::{DirectLight, LitTexel};
+use locate::TriangleLocator;
 
 /// A finished lightmap page.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,4 +36,116 @@ pub struct Lightmap {
     pub height: u32,
     /// Row by row from the top: the quantity asked for, linear RGB.
     pub texels: Vec<[f32; 3]>,
+}
+
+/// What texels are made from.
+pub struct RasterInput<'a> {
+    /// The surfaces.
+    pub surfaces: &'a [Surface],
+    /// Their places in the page.
+    pub atlas: &'a Atlas,
+    /// The light on them.
+    pub mesh: &'a RadiosityMesh,
+    /// The scene's triangles.
+    pub tracer: &'a Tracer,
+    /// Their convex outlines.
+    pub occluders: &'a Occluders,
+    /// What shines.
+    pub emitters: &'a [Emitter],
+    /// Reflectance and emission, for [`Quantity::Radiosity`].
+    pub appearance: &'a (dyn SurfaceAppearance + Sync),
+    /// The caller's options.
+    pub options: &'a BakeOptions,
+}
+
+/// What rasterizing took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TexelCounts {
+    /// Texels that lie in a chart or are touched by a lookup inside it.
+    pub covered: u64,
+    /// Texels filled from their neighbours.
+    pub dilated: u64,
+    /// Evaluations of direct light and rays, emitters times points.
+    pub effort: Effort,
+}
+
+/// Computes all texels of the page.
+#[must_use]
+pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
+    let buried: Vec<Vec<bool>> = input
+        .surfaces
+        .par_iter()
+        .map(|s| s.regions.iter().map(|r| s.regions.len() > 1 && buried::is_buried(s, r, input.tracer)).collect())
+        .collect();
+    let is_open = |surface: usize, region: usize| !buried[surface][region];
+    let sites = coverage::sites(input.surfaces, input.atlas, &is_open);
+    let mut of_surface: Vec<Vec<usize>> = vec![Vec::new(); input.surfaces.len()];
+    for (index, site) in sites.iter().enumerate() {
+        of_surface[site.surface as usize].push(index);
+    }
+    let lit: Vec<(Vec<LitTexel>, Effort)> = of_surface
+        .par_iter()
+        .enumerate()
+        .map(|(surface, indices)| surface_texels(input, surface, indices, &sites))
+        .collect();
+    let size = (input.atlas.width, input.atlas.height);
+    let count = size.0 as usize * size.1 as usize;
+    let (mut texels, mut valid) = (vec![[0.0; 3]; count], vec![false; count]);
+    let mut counts = TexelCounts { covered: sites.len() as u64, ..TexelCounts::default() };
+    for (lit, effort) in &lit {
+        counts.effort.add(*effort);
+        for texel in lit {
+            let site = &sites[texel.site];
+            let at = site.y as usize * size.0 as usize + site.x as usize;
+            texels[at] = texel.direct.as_vec3().to_array();
+            valid[at] = true;
+        }
+    }
+    let before = valid.iter().filter(|&&v| v).count();
+    dilate::dilate(&mut texels, &mut valid, size, input.atlas.padding);
+    counts.dilated = (valid.iter().filter(|&&v| v).count() - before) as u64;
+    (Lightmap { width: size.0, height: size.1, texels }, counts)
+}
+
+/// The finished values of one surface's texels, in `direct`.
+fn surface_texels(
+    input: &RasterInput,
+    surface: usize,
+    indices: &[usize],
+    sites: &[TexelSite],
+) -> (Vec<LitTexel>, Effort) {
+    let mut texels: Vec<LitTexel> = indices
+        .iter()
+        .map(|&site| LitTexel {
+            site,
+            region: sites[site].region,
+            point: sites[site].point,
+            direct: DVec3::ZERO,
+        })
+        .collect();
+    let plane_from_texel = input.atlas.charts[surface].texel_from_plane.inverse();
+    let step = [DVec2::X, DVec2::Y].map(|d| plane_from_texel.transform_vector2(d));
+    let mut effort = Effort::default();
+    if input.options.direct == Direct::Texel {
+        let light =
+            DirectLight { tracer: input.tracer, occluders: input.occluders, emitters: input.emitters };
+        effort = light.shine(&input.surfaces[surface], step, &mut texels);
+    }
+    let locator = TriangleLocator::new(&input.mesh.surfaces[surface]);
+    let half = 0.5 * (step[0].abs() + step[1].abs());
+    for texel in &mut texels {
+        let (direct, indirect) = locator.light_at(texel.point, texel.region);
+        let from_mesh = if input.options.direct == Direct::Mesh { direct } else { DVec3::ZERO };
+        let irradiance = texel.direct + from_mesh + indirect;
+        texel.direct = match input.options.quantity {
+            Quantity::Irradiance => irradiance,
+            Quantity::Radiance => irradiance / PI,
+            Quantity::Radiosity => {
+                let (min, max) = (texel.point - half, texel.point + half);
+                input.appearance.exitance(surface, min, max)
+                    + input.appearance.reflectance(surface, min, max) * irradiance
+            }
+        };
+    }
+    (texels, effort)
 }

@@ -19,7 +19,7 @@ use super::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use super::form_factor::point_to_disk;
 use super::umbra::Occluders;
 use crate::cob::{Cob, CobState, Prism, prism_height};
-use crate::element::{Appearance, Facet, NONE};
+use crate::element::{SurfaceAppearance, Facet, NONE};
 use crate::light::luminance;
 use crate::options::{BakeOptions, Refine, Toggle};
 use crate::trace::Tracer;
@@ -38,7 +38,7 @@ pub struct DirectPass<'a> {
     /// Their convex outlines.
     pub occluders: &'a Occluders,
     /// Reflectances of new elements.
-    pub appearance: &'a (dyn Appearance + Sync),
+    pub appearance: &'a (dyn SurfaceAppearance + Sync),
     /// The caller's options.
     pub options: &'a BakeOptions,
     /// Elements no larger than this are not split, metres.

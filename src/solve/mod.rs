@@ -17,7 +17,7 @@ pub mod visible;
 
 use glam::DVec3;
 
-use crate::element::{Appearance, Facet, Side};
+use crate::element::{SurfaceAppearance, Facet, Side};
 use crate::light::luminance;
 use crate::options::BakeOptions;
 use crate::scene::PunctualLight;
@@ -36,7 +36,7 @@ pub struct Problem<'a> {
     /// The surfaces that the facets lie on.
     pub surfaces: &'a [Surface],
     /// Reflectances of new elements.
-    pub appearance: &'a (dyn Appearance + Sync),
+    pub appearance: &'a (dyn SurfaceAppearance + Sync),
     /// Lights without extent.
     pub lights: &'a [PunctualLight],
     /// The caller's options.
