@@ -147,7 +147,8 @@ mod tests {
         let floor_below = sheet(0.2, -0.1);
         let coplanar = sheet(0.2, 0.0);
         let wall_at_foot = [DVec3::new(1.0, 0.0, 0.0), DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 0.0, 1.0)];
-        let scene = vec![sheet(0.2, 0.001), sheet(0.2, 0.5), sheet(1.2, 0.1), floor_below, coplanar, wall_at_foot];
+        let scene =
+            vec![sheet(0.2, 0.001), sheet(0.2, 0.5), sheet(1.2, 0.1), floor_below, coplanar, wall_at_foot];
         let tracer = Tracer::new(scene);
         let mut lists = CobLists::default();
         let cob = lists.fill(&prism(0.0, 0.3), Cob::UNINITIALIZED, &tracer);

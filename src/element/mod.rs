@@ -18,7 +18,7 @@ mod sampling;
 use glam::{DVec2, DVec3};
 
 pub use appearance::SceneAppearance;
-pub use build::{SurfaceAppearance, MeshOptions, build};
+pub use build::{MeshOptions, SurfaceAppearance, build};
 pub use facet::{Facet, Sample, Side};
 
 use crate::cob::Cob;

@@ -63,7 +63,8 @@ mod tests {
 
     #[test]
     fn a_notch_is_not_convex() {
-        let ring = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
+        let ring =
+            [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.5), (0.0, 2.0)].map(|(x, y)| DVec2::new(x, y));
         assert!(!is_convex(&ring));
     }
 }

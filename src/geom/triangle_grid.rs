@@ -114,9 +114,7 @@ pub fn nearest_in_triangle(corners: [DVec2; 3], p: DVec2) -> Nearest {
         return Nearest { distance_squared: 0.0, barycentric: weigh(p) };
     }
     let feet = edges.map(|(s, e)| nearest_on_segment(s, e, p));
-    let foot = feet
-        .into_iter()
-        .min_by(|q, r| q.distance_squared(p).total_cmp(&r.distance_squared(p)))
-        .unwrap_or(a);
+    let foot =
+        feet.into_iter().min_by(|q, r| q.distance_squared(p).total_cmp(&r.distance_squared(p))).unwrap_or(a);
     Nearest { distance_squared: foot.distance_squared(p), barycentric: weigh(foot) }
 }

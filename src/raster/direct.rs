@@ -71,7 +71,9 @@ struct Shining<'a> {
 }
 
 fn extent(texels: &[LitTexel]) -> (DVec2, DVec2) {
-    texels.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), t| (lo.min(t.point), hi.max(t.point)))
+    texels
+        .iter()
+        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), t| (lo.min(t.point), hi.max(t.point)))
 }
 
 impl Shining<'_> {

@@ -60,7 +60,13 @@ mod tests {
             indirect: DVec3::splat(2.0 - y),
         };
         SurfaceMesh {
-            vertices: vec![corner(0.0, 0.0), corner(4.0, 0.0), corner(4.0, 4.0), corner(0.0, 4.0), corner(1.0, 2.0)],
+            vertices: vec![
+                corner(0.0, 0.0),
+                corner(4.0, 0.0),
+                corner(4.0, 4.0),
+                corner(0.0, 4.0),
+                corner(1.0, 2.0),
+            ],
             triangles: vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
             regions: vec![0; 4],
         }
@@ -73,7 +79,10 @@ mod tests {
         for k in 0..100 {
             let p = DVec2::new(f64::from(k % 10) * 0.44, f64::from(k / 10) * 0.44);
             let (direct, indirect) = locator.light_at(p, 0);
-            assert!((direct.x - (1.0 + p.x)).abs() < 1e-12 && (indirect.x - (2.0 - p.y)).abs() < 1e-12, "{p}");
+            assert!(
+                (direct.x - (1.0 + p.x)).abs() < 1e-12 && (indirect.x - (2.0 - p.y)).abs() < 1e-12,
+                "{p}"
+            );
         }
     }
 

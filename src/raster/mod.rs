@@ -75,7 +75,9 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
     let buried: Vec<Vec<bool>> = input
         .surfaces
         .par_iter()
-        .map(|s| s.regions.iter().map(|r| s.regions.len() > 1 && buried::is_buried(s, r, input.tracer)).collect())
+        .map(|s| {
+            s.regions.iter().map(|r| s.regions.len() > 1 && buried::is_buried(s, r, input.tracer)).collect()
+        })
         .collect();
     let is_open = |surface: usize, region: usize| !buried[surface][region];
     let sites = coverage::sites(input.surfaces, input.atlas, &is_open);

@@ -1,6 +1,9 @@
 //! Stage 5: leaf vertices and outlines become triangles that conform. The only module that knows spade.
 
+pub mod mesh;
+mod stub;
 use glam::{DVec2, DVec3};
+pub use stub::triangulate;
 
 /// A planar region to triangulate.
 #[derive(Clone, Copy, Debug)]

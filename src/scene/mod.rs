@@ -137,3 +137,16 @@ pub struct SourceDocument {
     /// type, so that the output can embed it. `None` where the image lies in a bufferView.
     pub external_images: Vec<Option<(Vec<u8>, String)>>,
 }
+
+impl Scene {
+    /// stub
+    #[must_use]
+    pub fn reflectance_at(&self, _: usize, _: [f64; 3], _: f64) -> DVec3 {
+        DVec3::ZERO
+    }
+    /// stub
+    #[must_use]
+    pub fn emission_at(&self, _: usize, _: [f64; 3], _: f64) -> DVec3 {
+        DVec3::ZERO
+    }
+}

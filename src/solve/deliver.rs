@@ -25,7 +25,7 @@ use crate::options::Refine;
 const WEAK: f64 = 3e-4;
 
 /// The error in an element's middle that a delivery may leave, as a fraction of the light there.
-const TOLERANCE: f64 = 2e-3;
+const TOLERANCE: f64 = 4e-4;
 
 /// What delivering took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -244,9 +244,7 @@ pub fn spread_kept(patches: &Patches, facets: &mut [Facet], grain: f64) {
         let cell = (facet.frame.lift(corner) / grain).round().as_i64vec3();
         (facet.surface, facet.region, facet.side == Side::Front, cell.to_array())
     };
-    let corners = |e: &Element| {
-        [e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)]
-    };
+    let corners = |e: &Element| [e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)];
     let mut sums: HashMap<_, (DVec3, f64)> = HashMap::new();
     for patch in &patches.patches {
         let facet = &facets[patch.facet as usize];

@@ -19,7 +19,7 @@ use super::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use super::form_factor::point_to_disk;
 use super::umbra::Occluders;
 use crate::cob::{Cob, CobState, Prism, prism_height};
-use crate::element::{SurfaceAppearance, Facet, NONE};
+use crate::element::{Facet, NONE, SurfaceAppearance};
 use crate::light::luminance;
 use crate::options::{BakeOptions, Refine, Toggle};
 use crate::trace::Tracer;

@@ -157,8 +157,8 @@ impl AreaEmitter {
                 let q = point_in_fan(part, u, v);
                 let d = q - receiver.position;
                 let square = d.length_squared();
-                let kernel =
-                    receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0) / (square * square);
+                let kernel = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0)
+                    / (square * square);
                 if kernel > 0.0 {
                     all += kernel * area;
                     e.effort.rays += 1;
@@ -173,7 +173,9 @@ impl AreaEmitter {
 }
 
 fn fan_area(part: &[DVec3]) -> f64 {
-    (1..part.len().saturating_sub(1)).map(|i| crate::geom::triangle::area([part[0], part[i], part[i + 1]])).sum()
+    (1..part.len().saturating_sub(1))
+        .map(|i| crate::geom::triangle::area([part[0], part[i], part[i + 1]]))
+        .sum()
 }
 
 /// Maps the unit square onto a convex polygon, area for area.
@@ -361,7 +363,8 @@ mod tests {
 
     fn lamp() -> AreaEmitter {
         let frame = Frame::new(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, DVec3::X);
-        let ring = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| DVec2::new(x, y)).to_vec();
+        let ring =
+            [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| DVec2::new(x, y)).to_vec();
         let t = [[ring[0], ring[1], ring[2]], [ring[0], ring[2], ring[3]]];
         AreaEmitter::new(frame, &[ring], &t, DVec3::ONE)
     }
@@ -375,7 +378,8 @@ mod tests {
         let mut e = Evaluation::new(Precision::EMITTER);
         for x in [-0.6, 0.0, 0.3, 0.6] {
             let exact = lamp.visible(floor_point(x), &tracer, &[0], &mut e);
-            let rays = lamp.unoccluded(floor_point(x)) * lamp.fraction_by_rays(floor_point(x), &tracer, &mut e);
+            let rays =
+                lamp.unoccluded(floor_point(x)) * lamp.fraction_by_rays(floor_point(x), &tracer, &mut e);
             // 64 rays resolve the edge to an eighth of the lamp's side.
             assert!((exact - rays).abs() < 0.1 * lamp.unoccluded(floor_point(x)), "{x}: {exact} {rays}");
         }

@@ -134,7 +134,8 @@ mod tests {
             (0.906_179_845_938_664, 0.236_926_885_056_189_08),
         ];
         const CELLS: u32 = 40;
-        let points = |c: u32| NODES.map(|(x, w)| ((f64::from(c) + 0.5 + 0.5 * x) / f64::from(CELLS), w / 2.0));
+        let points =
+            |c: u32| NODES.map(|(x, w)| ((f64::from(c) + 0.5 + 0.5 * x) / f64::from(CELLS), w / 2.0));
         let mut sum = 0.0;
         for (i, j) in (0..CELLS * CELLS).map(|k| (k % CELLS, k / CELLS)) {
             for (x, wx) in points(i) {
@@ -192,11 +193,8 @@ mod tests {
     /// receiver sits and whichever way it faces.
     #[test]
     fn closed_box_sums_to_one() {
-        let axes = [
-            (DVec3::X, DVec3::Y, DVec3::Z),
-            (DVec3::Y, DVec3::Z, DVec3::X),
-            (DVec3::Z, DVec3::X, DVec3::Y),
-        ];
+        let axes =
+            [(DVec3::X, DVec3::Y, DVec3::Z), (DVec3::Y, DVec3::Z, DVec3::X), (DVec3::Z, DVec3::X, DVec3::Y)];
         for i in 0..257 {
             let t = f64::from(i);
             let normal = DVec3::new((1.7 * t).sin(), (2.3 * t).cos(), (0.9 * t).sin()).normalize();
@@ -234,7 +232,10 @@ mod tests {
             point_to_polygon(SurfacePoint { position: lower(x, y), normal: DVec3::Z }, &ring(&upper, true))
         });
         let from_upper = mean_over_unit_square(|x, y| {
-            point_to_polygon(SurfacePoint { position: upper(x, y), normal: upper_normal }, &ring(&lower, false))
+            point_to_polygon(
+                SurfacePoint { position: upper(x, y), normal: upper_normal },
+                &ring(&lower, false),
+            )
         });
         assert!((a * from_lower - upper_area * from_upper).abs() < 1e-9, "{from_lower} {from_upper}");
     }

@@ -17,7 +17,7 @@ pub mod visible;
 
 use glam::DVec3;
 
-use crate::element::{SurfaceAppearance, Facet, Side};
+use crate::element::{Facet, Side, SurfaceAppearance};
 use crate::light::luminance;
 use crate::options::BakeOptions;
 use crate::scene::PunctualLight;
@@ -133,7 +133,11 @@ fn emitters(problem: &Problem, facets: &[Facet]) -> (Vec<Emitter>, Vec<Emitter>)
         let region = &problem.surfaces[facet.surface].regions[facet.region];
         let triangles: Vec<_> = match facet.side {
             Side::Front => region.triangles.clone(),
-            Side::Back => region.triangles.iter().map(|t| [t[0], t[2], t[1]].map(|p| facet.from_surface_plane(p))).collect(),
+            Side::Back => region
+                .triangles
+                .iter()
+                .map(|t| [t[0], t[2], t[1]].map(|p| facet.from_surface_plane(p)))
+                .collect(),
         };
         glowing.push(Emitter::Area(AreaEmitter::new(
             facet.frame,
@@ -183,7 +187,11 @@ fn mean_direct(patches: &Patches, facets: &[Facet]) -> Vec<DVec3> {
 }
 
 /// Shots until the unshot power is small; `None` when told to stop.
-fn shoot_patches(patches: &mut Patches, problem: &Problem, progress: &mut dyn FnMut(f64) -> bool) -> Option<()> {
+fn shoot_patches(
+    patches: &mut Patches,
+    problem: &Problem,
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Option<()> {
     let at_first = patches.unshot_power().element_sum();
     let enough = patches.energy.emitted.element_sum() * problem.options.unshot_fraction;
     loop {

@@ -72,12 +72,21 @@ pub struct Energy {
     pub unshot: DVec3,
 }
 
+/// What one patch exchanges with all.
+struct Row {
+    /// `A_i F_ij`, as the quadrature has it: the same seen from either patch.
+    factors: Box<[f32]>,
+    /// What the factors are multiplied by so that all of the light arrives that neither escapes nor meets
+    /// a back.
+    scale: f64,
+}
+
 /// The patches and what they exchange.
 pub struct Patches {
     /// All patches, in the order of facets.
     pub patches: Vec<Patch>,
     /// `A_i F_ij` for patches `i` that have shot.
-    rows: Vec<Option<Box<[f32]>>>,
+    rows: Vec<Option<Row>>,
     /// Where the light went.
     pub energy: Energy,
     /// Reflected shots so far.
@@ -175,17 +184,13 @@ impl Patches {
         if self.rows[shooter].is_none() {
             self.rows[shooter] = Some(self.row(shooter, tracer));
         }
-        let row = self.rows[shooter].as_deref()?;
+        let row = self.rows[shooter].as_ref()?;
         let patch = &mut self.patches[shooter];
         let shot = std::mem::take(&mut patch.unshot) * patch.area;
-        let (area, escaping, onto_backs) = (patch.area, patch.escaping, patch.onto_backs);
-        let sum: f64 = row.iter().map(|&g| f64::from(g)).sum::<f64>() / area;
-        let arriving = 1.0 - escaping - onto_backs;
-        let scale =
-            if sum > 0.0 { (arriving / sum).clamp(1.0 / MOST_SCALING, MOST_SCALING) } else { 0.0 };
-        let factor = shot / area * scale;
+        let (escaping, onto_backs) = (patch.escaping, patch.onto_backs);
+        let factor = shot / patch.area * row.scale;
         let mut absorbed = DVec3::ZERO;
-        for (receiver, &g) in self.patches.iter_mut().zip(row) {
+        for (receiver, &g) in self.patches.iter_mut().zip(&row.factors) {
             if g > 0.0 {
                 let arrived = factor * f64::from(g);
                 let reflected = arrived * receiver.reflectance;
@@ -201,14 +206,14 @@ impl Patches {
     }
 
     /// The exchange factors of one patch with all.
-    fn row(&mut self, shooter: usize, tracer: &Tracer) -> Box<[f32]> {
+    fn row(&mut self, shooter: usize, tracer: &Tracer) -> Row {
         let rays = AtomicCount::default();
         let (patches, rows) = (&self.patches, &self.rows);
-        let row: Vec<f32> = (0..patches.len())
+        let factors: Vec<f32> = (0..patches.len())
             .into_par_iter()
             .with_min_len(64)
             .map(|other| match &rows[other] {
-                Some(known) => known[shooter],
+                Some(known) => known.factors[shooter],
                 None if other == shooter => 0.0,
                 None => {
                     let (g, cast) = exchange(&patches[shooter], &patches[other], tracer);
@@ -218,7 +223,11 @@ impl Patches {
             })
             .collect();
         self.rays += rays.get();
-        row.into_boxed_slice()
+        let patch = &self.patches[shooter];
+        let sum = factors.iter().map(|&g| f64::from(g)).sum::<f64>() / patch.area;
+        let arriving = 1.0 - patch.escaping - patch.onto_backs;
+        let scale = if sum > 0.0 { (arriving / sum).clamp(1.0 / MOST_SCALING, MOST_SCALING) } else { 0.0 };
+        Row { factors: factors.into_boxed_slice(), scale }
     }
 
     /// The irradiance that patch `shooter` gives patch `receiver` for each unit of its radiosity; 0 where
@@ -226,11 +235,11 @@ impl Patches {
     #[must_use]
     pub fn factor(&self, shooter: usize, receiver: usize) -> f64 {
         let g = match (&self.rows[shooter], &self.rows[receiver]) {
-            (Some(row), _) => row[receiver],
-            (None, Some(row)) => row[shooter],
+            (Some(row), _) => f64::from(row.factors[receiver]) * row.scale,
+            (None, Some(row)) => f64::from(row.factors[shooter]) * row.scale,
             (None, None) => 0.0,
         };
-        f64::from(g) / self.patches[receiver].area
+        g / self.patches[receiver].area
     }
 }
 
@@ -282,8 +291,7 @@ impl Patch {
                 let u = (f64::from(k % HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
                 let v = (f64::from(k / HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
                 let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
-                let direction =
-                    v.sqrt() * (cos * frame.u + sin * frame.v) + (1.0 - v).sqrt() * frame.normal;
+                let direction = v.sqrt() * (cos * frame.u + sin * frame.v) + (1.0 - v).sqrt() * frame.normal;
                 match tracer.closest_hit(point, direction) {
                     None => escaping += 1,
                     Some(hit) if hit.from_behind && !tracer.is_double_sided(hit.triangle) => behind += 1,
@@ -307,7 +315,7 @@ fn exchange(a: &Patch, b: &Patch, tracer: &Tracer) -> (f64, u64) {
     let (receiver, shooter) = if a.area <= b.area { (a, b) } else { (b, a) };
     let distance = d.length();
     if distance > FAR * a.radius.max(b.radius) {
-        let f = if shooter.area < 0.05 * distance * distance {
+        let f = if shooter.area < 0.01 * distance * distance {
             point_to_disk(receiver.centre, shooter.centre.position, shooter.centre.normal, shooter.area)
         } else {
             point_to_polygon(receiver.centre, &shooter.hull)

@@ -93,8 +93,9 @@ impl Shooters {
         let share = (e.area / signed_area(&corners)).min(1.0);
         let centre = facet.frame.lift(e.centroid);
         let rings: [Ring; 1] = [corners];
-        let triangles: Vec<_> =
-            (1..rings[0].len().saturating_sub(1)).map(|i| [rings[0][0], rings[0][i], rings[0][i + 1]]).collect();
+        let triangles: Vec<_> = (1..rings[0].len().saturating_sub(1))
+            .map(|i| [rings[0][0], rings[0][i], rings[0][i + 1]])
+            .collect();
         let emitter = AreaEmitter::new(facet.frame, &rings, &triangles, radiosity * share);
         self.all.push(Shooter {
             emitter: Emitter::Area(emitter),

@@ -233,8 +233,7 @@ mod tests {
     #[test]
     fn segments_through_a_square_are_occluded_far_from_the_origin_too() {
         for offset in [DVec3::ZERO, DVec3::new(1e6, -1e6, 1e6)] {
-            let tracer =
-                Tracer::new(square_at(0.5).map(|t| t.map(|p| p + offset)).into_iter().collect());
+            let tracer = Tracer::new(square_at(0.5).map(|t| t.map(|p| p + offset)).into_iter().collect());
             let at = |x, y, z| DVec3::new(x, y, z) + offset;
             assert!(tracer.occluded(at(0.3, 0.6, 0.0), at(0.3, 0.6, 1.0)));
             assert!(tracer.occluded(at(0.3, 0.6, 1.0), at(0.3, 0.6, 0.0)));

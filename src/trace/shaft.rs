@@ -202,11 +202,7 @@ fn push_oriented(plane: HalfSpace, side: Side, planes: &mut Vec<HalfSpace>) {
 /// Newell's normal; `None` for a point, a line, or nothing.
 fn normal_of(polygon: &[DVec3]) -> Option<DVec3> {
     let &origin = polygon.first()?;
-    polygon
-        .windows(2)
-        .map(|e| (e[0] - origin).cross(e[1] - origin))
-        .sum::<DVec3>()
-        .try_normalize()
+    polygon.windows(2).map(|e| (e[0] - origin).cross(e[1] - origin)).sum::<DVec3>().try_normalize()
 }
 
 #[cfg(test)]
