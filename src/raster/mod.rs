@@ -1,5 +1,11 @@
 //! Stage 7: from charts and the radiosity mesh to texels.
 
+pub mod coverage;
+pub mod dilate;
+
+pub use coverage::{SitePosition, TexelSite, sites};
+pub use dilate::dilate;
+
 /// A finished lightmap page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lightmap {
