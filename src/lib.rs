@@ -6,6 +6,7 @@ pub mod export;
 pub mod geom;
 pub mod light;
 pub mod options;
+pub mod picture;
 pub mod progress;
 pub mod raster;
 pub mod retriangulate;

@@ -4,11 +4,11 @@
 //! own chart and outside of any solid that stands there; the rest of the padding is filled
 //! from it.
 
-pub mod buried;
-pub mod coverage;
-pub mod dilate;
-pub mod direct;
-pub mod locate;
+mod buried;
+mod coverage;
+mod dilate;
+mod direct;
+mod locate;
 
 use std::f64::consts::PI;
 
@@ -23,7 +23,8 @@ use crate::solve::umbra::Occluders;
 use crate::surface::Surface;
 use crate::trace::Tracer;
 use crate::unwrap::Atlas;
-use coverage::TexelSite;
+pub use coverage::{SitePosition, TexelSite, sites};
+pub use dilate::dilate;
 use direct::{DirectLight, LitTexel};
 use locate::TriangleLocator;
 
@@ -80,7 +81,7 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
         })
         .collect();
     let is_open = |surface: usize, region: usize| !buried[surface][region];
-    let sites = coverage::sites(input.surfaces, input.atlas, &is_open);
+    let sites = sites(input.surfaces, input.atlas, &is_open);
     let mut of_surface: Vec<Vec<usize>> = vec![Vec::new(); input.surfaces.len()];
     for (index, site) in sites.iter().enumerate() {
         of_surface[site.surface as usize].push(index);
@@ -104,7 +105,7 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
         }
     }
     let before = valid.iter().filter(|&&v| v).count();
-    dilate::dilate(&mut texels, &mut valid, size, input.atlas.padding);
+    dilate(&mut texels, &mut valid, size, input.atlas.padding);
     counts.dilated = (valid.iter().filter(|&&v| v).count() - before) as u64;
     (Lightmap { width: size.0, height: size.1, texels }, counts)
 }

@@ -1,6 +1,30 @@
-//! Stage 6: charts are laid out in the lightmap's page.
+//! Stage 6: charts are laid out in the lightmap's page. The only module that knows xatlas.
+//!
+//! A surface is flat, so its chart is an affine map of the surface's frame: a scale that makes the
+//! extents whole numbers of texels, a quarter turn at most, and a whole-number shift. The extreme
+//! corners therefore lie on texel centres, and a bilinear lookup inside a chart of `w × h` texels
+//! touches exactly `(w + 1) × (h + 1)` of them. No chart is thinner than one texel.
+//!
+//! Two packers share one trait: a skyline over bounding rectangles, quick and always there, and
+//! xatlas (feature `xatlas`), which sees the charts' shapes and nests them. The skyline's density
+//! is where xatlas's search begins, and the answer where xatlas finds nothing better.
+
+mod bit_grid;
+mod density;
+mod error;
+pub(crate) mod footprint;
+mod pack;
+mod shape;
+mod skyline;
+#[cfg(feature = "xatlas")]
+mod xatlas;
+
+pub use error::UnwrapError;
 
 use glam::{DAffine2, DVec2};
+
+use crate::options::Resolution;
+use crate::surface::Surface;
 
 /// Where each surface lies in the lightmap.
 #[derive(Clone, Debug)]
@@ -11,13 +35,16 @@ pub struct Atlas {
     pub height: u32,
     /// Texels per metre of surface, before what rounding charts to whole texels changed.
     pub texels_per_metre: f64,
-    /// Free texels kept around each chart.
+    /// Free texels kept around what bilinear lookups of a chart touch, so that twice as many lie
+    /// between two charts; none at the page's edge.
     pub padding: u32,
     /// One per surface, in order.
     pub charts: Vec<Chart>,
 }
 
 /// A surface's place in the page: an affine map, since a surface is flat.
+///
+/// It can always be inverted. It may mirror: a chart that is turned has its axes swapped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chart {
     /// Takes the surface's plane coordinates (metres) to texels; `(0, 0)` is the page's top left corner,
@@ -33,20 +60,35 @@ impl Chart {
     }
 }
 
-/// Why no atlas could be made.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum UnwrapError {
-    /// The charts with their padding do not fit.
-    #[error(
-        "{charts} charts with {padding} texels of padding do not fit into {side} × {side} texels; ask for a larger --size or a smaller --padding"
-    )]
-    TooSmall {
-        /// How many charts there are.
-        charts: usize,
-        /// Padding asked for.
-        padding: u32,
-        /// The page's side.
-        side: u32,
-    },
+/// What [`unwrap`] can be told.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UnwrapOptions {
+    /// The page's side, or the density from which it follows.
+    pub resolution: Resolution,
+    /// Free texels around each chart's bilinear footprint. Default: 1, which leaves two between
+    /// charts, enough for bilinear filtering with a graphics card's fixed-point weights; 0 where
+    /// the charts do not fit otherwise.
+    pub padding: Option<u32>,
+}
+
+/// Lays the surfaces' charts out in one square page.
+///
+/// With [`Resolution::Size`] the page has exactly that side, and the density is the largest that
+/// the search finds to fit. With [`Resolution::TexelsPerMetre`] the page's side is the least
+/// multiple of 4 that the packers reach. The same input gives the same atlas.
+///
+/// # Errors
+///
+/// [`UnwrapError::TooSmall`] if the charts do not fit even with one texel each,
+/// [`UnwrapError::TooLarge`] if the density asked for needs a page above 16384 texels.
+pub fn unwrap(surfaces: &[Surface], options: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
+    let shapes: Vec<_> = surfaces.iter().map(shape::Shape::of).collect();
+    let paddings = options.padding.map_or([1, 0], |p| [p, p]);
+    let first = density::lay_out(&shapes, options.resolution, paddings[0]);
+    if first.is_err() && paddings[1] != paddings[0] {
+        if let Ok(atlas) = density::lay_out(&shapes, options.resolution, paddings[1]) {
+            return Ok(atlas);
+        }
+    }
+    first
 }

@@ -1,0 +1,45 @@
+//! After the last stage: pictures for people.
+//!
+//! Lightmaps and planar drawings become PNG: what the solver did to a surface can be looked at
+//! without a viewer. Everything here takes plain data, polygons and colours, and knows no stage's
+//! types but the lightmap's. Pictures carry no text; the caller's file names say what they show.
+
+mod canvas;
+mod drawing;
+mod lightmap;
+mod png;
+mod tone;
+
+pub use drawing::{Cell, Line, MeshDrawing};
+pub use lightmap::lightmap_png;
+pub use tone::ToneMap;
+
+/// A colour of a picture: sRGB, 0 to 255.
+pub type Colour = [u8; 3];
+
+/// Paper.
+pub const WHITE: Colour = [255, 255, 255];
+/// Outlines of cells.
+pub const INK: Colour = [32, 32, 36];
+/// A Close Objects Buffer that nobody has asked for yet.
+pub const UNINITIALIZED: Colour = [176, 176, 176];
+/// A Close Objects Buffer without entries.
+pub const EMPTY: Colour = [86, 140, 205];
+/// A Close Objects Buffer with entries.
+pub const NOT_EMPTY: Colour = [238, 144, 44];
+
+/// Why a picture could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PictureError {
+    /// The PNG encoder refused the picture.
+    #[error("cannot encode a picture of {width} × {height} pixels as PNG; try without --pictures")]
+    Encode {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// What the encoder reported.
+        source: image::ImageError,
+    },
+}

@@ -1,0 +1,32 @@
+//! Why no atlas could be made.
+
+/// Why no atlas could be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum UnwrapError {
+    /// The charts with their padding do not fit.
+    #[error(
+        "{charts} charts with {padding} texels of padding do not fit into {side} × {side} texels; ask for a larger --size or a smaller --padding"
+    )]
+    TooSmall {
+        /// How many charts there are.
+        charts: usize,
+        /// Padding asked for.
+        padding: u32,
+        /// The page's side.
+        side: u32,
+    },
+
+    /// The density asked for needs more than the largest page.
+    #[error(
+        "{charts} charts at {texels_per_metre} texels a metre do not fit into {side} × {side} texels; ask for a smaller --texels-per-metre"
+    )]
+    TooLarge {
+        /// How many charts there are.
+        charts: usize,
+        /// The density asked for.
+        texels_per_metre: f64,
+        /// The largest page's side.
+        side: u32,
+    },
+}

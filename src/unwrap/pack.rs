@@ -1,0 +1,84 @@
+//! What a packer is given and what it returns.
+
+use glam::{DAffine2, DMat2, DVec2};
+
+use super::Chart;
+use super::shape::Shape;
+
+/// A square page, and how far apart charts stay in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Page {
+    /// Texels.
+    pub(super) side: u32,
+    /// Free texels around each footprint; the page's edge needs none.
+    pub(super) padding: u32,
+}
+
+/// A shape at a density: its extents in whole texels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SizedShape<'a> {
+    /// The surface's outline.
+    pub(super) shape: &'a Shape,
+    /// Texels from the first texel centre to the last, at least 1; the footprint has one more.
+    pub(super) width: u32,
+    /// As `width`, in the second direction.
+    pub(super) height: u32,
+}
+
+/// Where a chart lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    /// Column of the footprint's first texel.
+    pub(super) x: u32,
+    /// Row of the footprint's first texel.
+    pub(super) y: u32,
+    /// How the chart lies.
+    pub(super) turn: Turn,
+}
+
+/// How a chart lies in the page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// The frame's first axis runs along rows.
+    Upright,
+    /// The frame's axes are swapped.
+    Swapped,
+}
+
+/// Puts charts into a page.
+pub(super) trait Packer {
+    /// One place per chart, in order, or nothing if they do not fit.
+    ///
+    /// The footprints, each grown by the padding, do not overlap, and lie in the page before they
+    /// are grown. The same input gives the same places.
+    fn pack(&self, charts: &[SizedShape<'_>], page: Page) -> Option<Vec<Place>>;
+}
+
+impl<'a> SizedShape<'a> {
+    /// `shape` at a density, rounded to whole texels; `None` if it is too long for any page.
+    pub(super) fn new(shape: &'a Shape, texels_per_metre: f64) -> Option<Self> {
+        let side = |metres: f64| {
+            let texels = (metres * texels_per_metre).round().max(1.0);
+            (texels < f64::from(super::density::LARGEST_SIDE)).then_some(texels as u32)
+        };
+        Some(Self { shape, width: side(shape.extent.x)?, height: side(shape.extent.y)? })
+    }
+
+    /// Texels per metre along each of the frame's axes.
+    pub(super) fn scale(&self) -> DVec2 {
+        let along = |texels: u32, metres: f64| if metres > 0.0 { f64::from(texels) / metres } else { 1.0 };
+        DVec2::new(along(self.width, self.shape.extent.x), along(self.height, self.shape.extent.y))
+    }
+
+    /// The map that puts the chart at `place`.
+    pub(super) fn chart(&self, place: Place) -> Chart {
+        let scale = self.scale();
+        let matrix = match place.turn {
+            Turn::Upright => DMat2::from_diagonal(scale),
+            Turn::Swapped => DMat2::from_cols(DVec2::new(0.0, scale.x), DVec2::new(scale.y, 0.0)),
+        };
+        let corner = DVec2::new(f64::from(place.x), f64::from(place.y)) + 0.5;
+        let texel_from_plane = DAffine2::from_mat2_translation(matrix, corner - matrix * self.shape.corner);
+        Chart { texel_from_plane }
+    }
+}

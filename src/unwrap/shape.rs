@@ -1,0 +1,67 @@
+//! What packing needs to know of a surface.
+
+use glam::DVec2;
+
+use crate::geom::polygon::orient;
+use crate::surface::Surface;
+
+/// A surface's outline in its own plane, metres.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    /// The least corner of the bounding rectangle.
+    pub(super) corner: DVec2,
+    /// The bounding rectangle's sides.
+    pub(super) extent: DVec2,
+    /// The regions' triangles; together the whole surface.
+    pub(super) triangles: Vec<[DVec2; 3]>,
+    /// The area of the triangles, square metres.
+    pub(super) area: f64,
+}
+
+impl Shape {
+    /// The shape of a surface. One that has no finite extent becomes a point, which gets a chart of one texel.
+    pub(super) fn of(surface: &Surface) -> Self {
+        let triangles: Vec<_> = surface.regions.iter().flat_map(|r| r.triangles.iter().copied()).collect();
+        let corners = surface.rings.iter().flatten().chain(triangles.iter().flatten());
+        let (low, high) =
+            corners.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+        let area = triangles.iter().map(|t| orient(t[0], t[1], t[2]).abs() / 2.0).sum();
+        let extent = high - low;
+        if extent.is_finite() && extent.cmpge(DVec2::ZERO).all() {
+            Self { corner: low, extent, triangles, area }
+        } else {
+            Self { corner: DVec2::ZERO, extent: DVec2::ZERO, triangles: Vec::new(), area: 0.0 }
+        }
+    }
+
+    /// The convex hull of the triangles, counter-clockwise, without collinear corners
+    /// (Andrew's monotone chain, 1979); fewer than three corners if there is no area.
+    #[cfg(feature = "xatlas")]
+    pub(super) fn convex_hull(&self) -> Vec<DVec2> {
+        let mut points: Vec<DVec2> = self.triangles.iter().flatten().copied().collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+        points.dedup();
+        let mut hull = half_hull(points.iter().copied());
+        let upper = half_hull(points.iter().rev().copied());
+        hull.pop();
+        hull.extend(upper);
+        hull.pop();
+        hull
+    }
+}
+
+/// The chain that turns left only.
+#[cfg(feature = "xatlas")]
+fn half_hull(points: impl Iterator<Item = DVec2>) -> Vec<DVec2> {
+    let mut chain: Vec<DVec2> = Vec::new();
+    for point in points {
+        while let [.., a, b] = chain[..] {
+            if orient(a, b, point) > 0.0 {
+                break;
+            }
+            chain.pop();
+        }
+        chain.push(point);
+    }
+    chain
+}
