@@ -3,14 +3,51 @@
 //! Everything that is hard about glTF ends here. Later stages see arrays of
 //! triangles; the only glTF they keep is [`SourceDocument`], which the export
 //! stage alone opens again.
+//!
+//! The order of work: [`container`] splits the file, [`document`] types its JSON, [`extension`] refuses
+//! what cannot be honoured, [`source`] reads buffers and images, [`hierarchy`] finds the nodes' places,
+//! [`place`] puts [`primitive`]s there (through [`accessor`]s), [`material`] and [`punctual`] read what
+//! shines and reflects, and [`appearance`] answers what a point looks like ([`texture`], [`pyramid`]).
+//!
+//! Every index, offset and length is checked where it is followed; nothing is allocated by a count
+//! alone. What is wrong is an [`ImportError`]; what is merely odd is a warning.
 
+mod accessor;
+mod appearance;
+mod container;
+mod document;
 mod error;
+mod extension;
+mod hierarchy;
+mod item;
+mod load;
+mod material;
+mod place;
+mod primitive;
+mod punctual;
+mod pyramid;
+mod source;
+mod texture;
+mod uri;
+mod warning;
 
+pub use accessor::AccessorFault;
+pub use appearance::Appearance;
 pub use error::ImportError;
+pub use item::Item;
+pub use load::{ImportOptions, from_bytes, load};
+pub use uri::UriError;
 
 use std::ops::Range;
 
 use glam::DVec3;
+
+/// The most vertices, and the most triangles, that a scene may place.
+const MAX_COUNT: usize = 1 << 26;
+
+/// The farthest from the origin that a vertex may lie, metres: beyond it products of four coordinates,
+/// which ray tracing in single precision forms, overflow.
+const MAX_COORDINATE: f64 = 1e9;
 
 /// A scene ready to be baked.
 #[derive(Debug)]
@@ -21,11 +58,14 @@ pub struct Scene {
     /// Zero-area triangles are kept (the output must hold them again).
     pub triangles: Vec<Triangle>,
     /// One entry per primitive of each node's mesh, in scene traversal order (depth first).
+    /// Primitives that hold no triangle have none.
     pub placements: Vec<Placement>,
     /// The document's materials in order, then the default material (always last).
     pub materials: Vec<Material>,
     /// Punctual lights in traversal order, in world space.
     pub lights: Vec<PunctualLight>,
+    /// Textures and what else varies over surfaces; `Appearance::default()` has none.
+    pub appearance: Appearance,
     /// The file as it was read, for writing it again.
     pub source: SourceDocument,
     /// What the user should know, one sentence each.
@@ -81,7 +121,6 @@ pub struct Material {
     pub double_sided: bool,
     /// Whether reflectance or emission varies over the surface, so that the `_at` functions matter.
     pub textured: bool,
-    // The scene stage adds private fields for textures here.
 }
 
 /// A light without extent (`KHR_lights_punctual`), in world space.
@@ -131,10 +170,11 @@ pub enum PunctualKind {
 pub struct SourceDocument {
     /// The whole glTF JSON.
     pub json: serde_json::Value,
-    /// Each buffer's bytes.
+    /// Each buffer's bytes, as many as its `byteLength` says.
     pub buffers: Vec<Vec<u8>>,
     /// Each image that is a file beside the document or a data URI: its encoded bytes and MIME
-    /// type, so that the output can embed it. `None` where the image lies in a bufferView.
+    /// type, so that the output can embed it. `None` where the image lies in a bufferView, or where
+    /// it could not be read (a warning says so, and the URI is left as it is).
     pub external_images: Vec<Option<(Vec<u8>, String)>>,
 }
 
