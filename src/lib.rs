@@ -1,13 +1,18 @@
 //! cobake bakes lightmaps: glTF in, glTF with EXR lightmaps out.
+mod bake;
 pub mod error;
 pub mod export;
 pub mod geom;
 pub mod light;
 pub mod options;
+pub mod picture;
 pub mod progress;
 pub mod raster;
+pub mod report;
 pub mod retriangulate;
 pub mod scene;
 pub mod surface;
 pub mod trace;
 pub mod unwrap;
+
+pub use bake::{BakeResult, bake};
