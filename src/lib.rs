@@ -1,4 +1,5 @@
 //! cobake bakes lightmaps: glTF in, glTF with EXR lightmaps out.
+mod bake;
 pub mod cob;
 pub mod element;
 pub mod error;
@@ -9,9 +10,12 @@ pub mod options;
 pub mod picture;
 pub mod progress;
 pub mod raster;
+pub mod report;
 pub mod retriangulate;
 pub mod scene;
 pub mod solve;
 pub mod surface;
 pub mod trace;
 pub mod unwrap;
+
+pub use bake::{BakeResult, bake};

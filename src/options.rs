@@ -61,7 +61,7 @@ pub enum Quantity {
 
 /// How fine the lightmap is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Resolution {
     /// The page's side in texels, `[16, 16384]`; the density follows.
@@ -78,7 +78,7 @@ impl Default for Resolution {
 
 /// The height of the prism above an element in which occluders count as close.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum CobHeight {
     /// A fraction of the element's size, above 0.
@@ -99,7 +99,7 @@ impl Default for CobHeight {
 pub struct BakeOptions {
     /// How fine the lightmap is. Default: a page of 512 texels a side.
     pub resolution: Resolution,
-    /// Worker threads; `0` takes one per core. The result does not depend on it. Default: `0`.
+    /// Worker threads, `[0, 1024]`; `0` takes one per core. The result does not depend on it. Default: `0`.
     pub threads: usize,
     /// Which elements are split. Default: [`Refine::CobGradient`].
     pub refine: Refine,
@@ -187,12 +187,13 @@ impl BakeOptions {
         };
         match self.resolution {
             Resolution::Size(side) => {
-                check((16..=16384).contains(&side), "size", f64::from(side), "between 16 and 16384 texels")?
+                check((16..=16384).contains(&side), "size", f64::from(side), "between 16 and 16384 texels")?;
             }
             Resolution::TexelsPerMetre(t) => {
-                check(t.is_finite() && t > 0.0, "texels-per-metre", t, "a number above 0")?
+                check(t.is_finite() && t > 0.0, "texels-per-metre", t, "a number above 0")?;
             }
         }
+        check(self.threads <= 1024, "threads", self.threads as f64, "at most 1024 (0 takes one per core)")?;
         match self.cob_height {
             CobHeight::OfElement(h) => {
                 check(h.is_finite() && h > 0.0, "cob-height", h, "a number above 0")?;

@@ -177,16 +177,3 @@ pub struct SourceDocument {
     /// it could not be read (a warning says so, and the URI is left as it is).
     pub external_images: Vec<Option<(Vec<u8>, String)>>,
 }
-
-impl Scene {
-    /// stub
-    #[must_use]
-    pub fn reflectance_at(&self, _: usize, _: [f64; 3], _: f64) -> DVec3 {
-        DVec3::ZERO
-    }
-    /// stub
-    #[must_use]
-    pub fn emission_at(&self, _: usize, _: [f64; 3], _: f64) -> DVec3 {
-        DVec3::ZERO
-    }
-}

@@ -1,0 +1,299 @@
+//! What was typed, and its conversion to what it means.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use cobake::options::{BakeOptions, CobHeight, Direct, Quantity, Refine, Resolution, Toggle, Topology};
+
+/// Bakes lightmaps into glTF scenes: radiosity on a mesh that refines itself near close occluders.
+#[derive(Debug, Parser)]
+#[command(name = "cobake", version, arg_required_else_help = true, after_help = AFTER_HELP)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const AFTER_HELP: &str = "\
+Exit codes: 0 done, 1 failed, 2 wrong use, 130 cancelled by Ctrl-C.
+COBAKE_LOG=error|warn|info|debug|trace writes the stages' log to stderr.";
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Bake a scene's lightmap into a new GLB file
+    Bake(Box<BakeArgs>),
+}
+
+/// The words after `bake`. Each option is described in [`BakeOptions`] in the same words.
+#[derive(Args, Debug)]
+pub(crate) struct BakeArgs {
+    /// Scene to light: a .gltf or .glb file
+    #[arg(value_name = "IN")]
+    pub(crate) input: PathBuf,
+
+    /// Where the lightmapped scene goes, as GLB; its folder must exist
+    #[arg(short, long, value_name = "OUT")]
+    pub(crate) output: PathBuf,
+
+    /// Write what was done and what it cost, as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) report: Option<PathBuf>,
+
+    /// Write lightmap.png and mesh.png into this folder; it is made if there is none
+    #[arg(long, value_name = "DIR")]
+    pub(crate) pictures: Option<PathBuf>,
+
+    /// Keep stderr empty: no progress, no warnings, no summary; errors still show
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+
+    /// Which of the document's scenes to bake [default: its default scene]
+    #[arg(long, value_name = "INDEX")]
+    scene: Option<usize>,
+
+    /// Worker threads, 0 to 1024; 0 takes one per core. The result does not depend on it
+    #[arg(long, value_name = "N", default_value_t = BakeOptions::default().threads)]
+    threads: usize,
+
+    /// The lightmap's side in texels, 16 to 16384; the density follows
+    #[arg(long, value_name = "TEXELS", default_value_t = 512, help_heading = LIGHTMAP)]
+    size: u32,
+
+    /// Texels per metre of surface, above 0; the lightmap's side follows
+    #[arg(long, value_name = "DENSITY", conflicts_with = "size", allow_negative_numbers = true, help_heading = LIGHTMAP)]
+    texels_per_metre: Option<f64>,
+
+    /// Padding around a chart, texels, 1 to 16 [default: 4, or less where the page is small]
+    #[arg(long, value_name = "TEXELS", help_heading = LIGHTMAP)]
+    padding: Option<u32>,
+
+    /// What a texel holds
+    #[arg(long, value_enum, default_value_t = QuantityWord::Irradiance, help_heading = LIGHTMAP)]
+    quantity: QuantityWord,
+
+    /// Where a texel's direct light comes from
+    #[arg(long, value_enum, default_value_t = DirectWord::Texel, help_heading = LIGHTMAP)]
+    direct: DirectWord,
+
+    /// The output's geometry
+    #[arg(long, value_enum, default_value_t = TopologyWord::Source, help_heading = LIGHTMAP)]
+    topology: TopologyWord,
+
+    /// Which elements are split when a shooter's light arrives
+    #[arg(long, value_enum, default_value_t = RefineWord::CobGradient, help_heading = REFINEMENT)]
+    refine: RefineWord,
+
+    /// Height of the Close Objects Buffer's prism, as a fraction of the element's size, above 0
+    #[arg(long, value_name = "FRACTION", default_value_t = 1.0, allow_negative_numbers = true, help_heading = REFINEMENT)]
+    cob_height: f64,
+
+    /// Height of the Close Objects Buffer's prism, metres, above 0
+    #[arg(long, value_name = "METRES", conflicts_with = "cob_height", allow_negative_numbers = true, help_heading = REFINEMENT)]
+    cob_height_fixed: Option<f64>,
+
+    /// Elements no larger than this are not split, metres, above 0 [default: what the lightmap can show]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = REFINEMENT)]
+    subdivision_threshold: Option<f64>,
+
+    /// A shot whose estimate M is below this fraction of the receiver's present radiosity does not
+    /// split it; above 0, at most 1
+    #[arg(long, value_name = "FRACTION", default_value_t = BakeOptions::default().illumination_threshold, allow_negative_numbers = true, help_heading = REFINEMENT)]
+    illumination_threshold: f64,
+
+    /// Split for close objects outside the shaft to the shooter too
+    #[arg(long, help_heading = REFINEMENT)]
+    no_shaft_test: bool,
+
+    /// Split elements that lie wholly in one occluder's umbra too
+    #[arg(long, help_heading = REFINEMENT)]
+    no_umbra_test: bool,
+
+    /// Stop when the unshot power falls below this fraction of the emitted power; above 0, below 1
+    #[arg(long, value_name = "FRACTION", default_value_t = BakeOptions::default().unshot_fraction, allow_negative_numbers = true, help_heading = SOLVER)]
+    unshot_fraction: f64,
+
+    /// Clamp reflectances to this; at least 0, below 1
+    #[arg(long, value_name = "REFLECTANCE", default_value_t = BakeOptions::default().max_reflectance, allow_negative_numbers = true, help_heading = SOLVER)]
+    max_reflectance: f64,
+}
+
+const LIGHTMAP: &str = "Lightmap";
+const REFINEMENT: &str = "Mesh refinement";
+const SOLVER: &str = "Solver";
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum RefineWord {
+    /// A priori: where an occluder stands close above the element
+    Cob,
+    /// A posteriori: where a new vertex differs from the interpolation of its parent's
+    Gradient,
+    /// Both of the above
+    #[value(name = "cob+gradient")]
+    CobGradient,
+    /// Every element down to the threshold: the baseline to compare with
+    Uniform,
+    /// No splits: the initial patches receive
+    None,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DirectWord {
+    /// Interpolated from the mesh's vertices, as the indirect light is
+    Mesh,
+    /// Evaluated anew in every texel: closed form times visibility
+    Texel,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TopologyWord {
+    /// The input's own triangles with a second set of texture coordinates
+    Source,
+    /// The retriangulated elements, with radiosity as a vertex attribute too
+    Adaptive,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum QuantityWord {
+    /// E: what three.js and MOZ_lightmap expect
+    Irradiance,
+    /// E / π: what Bevy, Godot, PlayCanvas and Unity expect
+    Radiance,
+    /// B = π L + ρ E: the light that leaves the surface
+    Radiosity,
+}
+
+impl From<RefineWord> for Refine {
+    fn from(word: RefineWord) -> Self {
+        match word {
+            RefineWord::Cob => Self::Cob,
+            RefineWord::Gradient => Self::Gradient,
+            RefineWord::CobGradient => Self::CobGradient,
+            RefineWord::Uniform => Self::Uniform,
+            RefineWord::None => Self::None,
+        }
+    }
+}
+
+impl From<DirectWord> for Direct {
+    fn from(word: DirectWord) -> Self {
+        match word {
+            DirectWord::Mesh => Self::Mesh,
+            DirectWord::Texel => Self::Texel,
+        }
+    }
+}
+
+impl From<TopologyWord> for Topology {
+    fn from(word: TopologyWord) -> Self {
+        match word {
+            TopologyWord::Source => Self::Source,
+            TopologyWord::Adaptive => Self::Adaptive,
+        }
+    }
+}
+
+impl From<QuantityWord> for Quantity {
+    fn from(word: QuantityWord) -> Self {
+        match word {
+            QuantityWord::Irradiance => Self::Irradiance,
+            QuantityWord::Radiance => Self::Radiance,
+            QuantityWord::Radiosity => Self::Radiosity,
+        }
+    }
+}
+
+impl From<&BakeArgs> for BakeOptions {
+    /// Says what was typed in the library's words; ranges are checked by [`BakeOptions::validate`].
+    fn from(args: &BakeArgs) -> Self {
+        let on_unless = |switched_off| if switched_off { Toggle::Off } else { Toggle::On };
+        let mut options = Self::default();
+        options.resolution =
+            args.texels_per_metre.map_or(Resolution::Size(args.size), Resolution::TexelsPerMetre);
+        options.threads = args.threads;
+        options.refine = args.refine.into();
+        options.direct = args.direct.into();
+        options.topology = args.topology.into();
+        options.quantity = args.quantity.into();
+        options.cob_height =
+            args.cob_height_fixed.map_or(CobHeight::OfElement(args.cob_height), CobHeight::Metres);
+        options.subdivision_threshold = args.subdivision_threshold;
+        options.illumination_threshold = args.illumination_threshold;
+        options.shaft_test = on_unless(args.no_shaft_test);
+        options.umbra_test = on_unless(args.no_umbra_test);
+        options.unshot_fraction = args.unshot_fraction;
+        options.max_reflectance = args.max_reflectance;
+        options.padding = args.padding;
+        options.scene = args.scene;
+        options
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// The options that `cobake bake in.glb -o out.glb` means with `words` after it.
+    fn options(words: &str) -> BakeOptions {
+        let line = format!("cobake bake in.glb -o out.glb {words}");
+        let cli = Cli::try_parse_from(line.split_whitespace()).expect("valid");
+        let Command::Bake(args) = cli.command;
+        BakeOptions::from(&*args)
+    }
+
+    #[test]
+    fn definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    /// The help prints its defaults from the parser; the library must have the same.
+    #[test]
+    fn nothing_typed_means_the_librarys_defaults() {
+        assert_eq!(options(""), BakeOptions::default());
+    }
+
+    #[test]
+    fn every_word_reaches_its_option() {
+        let typed = options(
+            "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
+             --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
+             --no-umbra-test --unshot-fraction 0.01 --max-reflectance 0.9 --padding 2 --scene 1",
+        );
+        let mut meant = BakeOptions::default();
+        meant.resolution = Resolution::Size(64);
+        meant.threads = 3;
+        meant.refine = Refine::Uniform;
+        meant.direct = Direct::Mesh;
+        meant.topology = Topology::Adaptive;
+        meant.quantity = Quantity::Radiosity;
+        meant.cob_height = CobHeight::OfElement(0.5);
+        meant.subdivision_threshold = Some(0.01);
+        meant.illumination_threshold = 0.2;
+        meant.shaft_test = Toggle::Off;
+        meant.umbra_test = Toggle::Off;
+        meant.unshot_fraction = 0.01;
+        meant.max_reflectance = 0.9;
+        meant.padding = Some(2);
+        meant.scene = Some(1);
+        assert_eq!(typed, meant);
+    }
+
+    #[test]
+    fn the_second_way_of_saying_size_and_height_wins_over_the_default() {
+        assert_eq!(options("--texels-per-metre 40").resolution, Resolution::TexelsPerMetre(40.0));
+        assert_eq!(options("--cob-height-fixed 0.03").cob_height, CobHeight::Metres(0.03));
+    }
+
+    #[test]
+    fn every_refinement_has_its_word() {
+        for (word, meaning) in [
+            ("cob", Refine::Cob),
+            ("gradient", Refine::Gradient),
+            ("cob+gradient", Refine::CobGradient),
+            ("uniform", Refine::Uniform),
+            ("none", Refine::None),
+        ] {
+            assert_eq!(options(&format!("--refine {word}")).refine, meaning, "{word}");
+        }
+    }
+}

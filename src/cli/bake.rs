@@ -1,0 +1,66 @@
+//! `cobake bake`: a scene in, a lightmapped scene out.
+
+use anyhow::Context;
+use cobake::BakeResult;
+use cobake::error::Error;
+use cobake::options::BakeOptions;
+use cobake::picture;
+use cobake::progress::{Progress, Stage};
+use cobake::report::{StageClock, peak_memory_bytes};
+
+use super::args::BakeArgs;
+use super::files::{Files, write_whole};
+use super::terminal::{TerminalProgress, Voice};
+use super::{interrupt, summary, terminal};
+
+/// Runs the command. Nothing is written unless the bake went through.
+pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
+    let options = BakeOptions::from(args);
+    options.validate().map_err(Error::from)?;
+    let files = Files {
+        input: &args.input,
+        output: &args.output,
+        report: args.report.as_deref(),
+        pictures: args.pictures.as_deref(),
+    };
+    files.check()?;
+
+    let voice = if args.quiet { Voice::Quiet } else { Voice::Normal };
+    let mut progress = TerminalProgress::new(voice, interrupt::watch()?);
+    let mut result = cobake::bake(files.input, &options, &mut progress)
+        .with_context(|| format!("cannot bake {}", files.input.display()))?;
+    if progress.is_cancelled() {
+        return Err(Error::Cancelled.into());
+    }
+    write(&files, &mut result)?;
+    progress.finish();
+
+    if voice == Voice::Normal && terminal::is_watched() {
+        terminal::say(&summary::paragraph(files.output, &result.report));
+    }
+    Ok(())
+}
+
+/// Writes the scene, then the pictures, then the report, which counts what the first took.
+fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
+    let mut clock = StageClock::start();
+    clock.begin(Stage::Export);
+    write_whole(files.output, &result.glb)?;
+    result.report.time.add(Stage::Export, clock.finish().total);
+    result.report.peak_memory_bytes = peak_memory_bytes();
+
+    if let Some(folder) = files.pictures {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        let lightmap = picture::of_lightmap(&result.lightmap);
+        let mesh = picture::of_mesh(&result.mesh, &result.atlas, &lightmap);
+        for (name, image) in [("lightmap.png", lightmap), ("mesh.png", mesh)] {
+            let path = folder.join(name);
+            let png = picture::to_png(&image).with_context(|| format!("cannot write {}", path.display()))?;
+            write_whole(&path, &png)?;
+        }
+    }
+    if let Some(path) = files.report {
+        write_whole(path, result.report.to_json().context("cannot put the report into JSON")?.as_bytes())?;
+    }
+    Ok(())
+}

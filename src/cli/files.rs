@@ -1,0 +1,203 @@
+//! Where results go: checked before the work, written whole or not at all.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use tempfile::NamedTempFile;
+
+use super::failure::WrongUse;
+
+/// The files of one command.
+#[derive(Debug)]
+pub(crate) struct Files<'a> {
+    /// What is read.
+    pub(crate) input: &'a Path,
+    /// The scene that is written.
+    pub(crate) output: &'a Path,
+    /// The report that is written.
+    pub(crate) report: Option<&'a Path>,
+    /// The folder into which pictures are written.
+    pub(crate) pictures: Option<&'a Path>,
+}
+
+impl Files<'_> {
+    /// Finds out before the work what would fail after it.
+    ///
+    /// Wrong use: a result would replace the input or another result, or the output's name promises a
+    /// text file. Failures: the input cannot be read, a result's folder is missing or cannot be written to.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        if self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
+            let name = self.output.with_extension("glb");
+            let message = format!("the output is a GLB file; name it {}", name.display());
+            return Err(WrongUse(message).into());
+        }
+        self.check_distinct()?;
+        check_input(self.input)?;
+        check_target(self.output)?;
+        self.report.map_or(Ok(()), check_target)?;
+        self.pictures.map_or(Ok(()), check_picture_folder)
+    }
+
+    fn check_distinct(&self) -> anyhow::Result<()> {
+        let same = |a: &Path, b: &Path| identity(a) == identity(b);
+        let message = if same(self.input, self.output) {
+            "the output would replace the input; give -o another name"
+        } else if self.report.is_some_and(|report| same(self.input, report)) {
+            "the report would replace the input; give --report another name"
+        } else if self.report.is_some_and(|report| same(self.output, report)) {
+            "the report would replace the output; give --report another name"
+        } else {
+            return Ok(());
+        };
+        Err(WrongUse(message.to_owned()).into())
+    }
+}
+
+/// What tells whether two paths lead to one file, existing or not: links resolved as far as the path exists.
+fn identity(path: &Path) -> PathBuf {
+    if let Ok(found) = fs::canonicalize(path) {
+        return found;
+    }
+    let name = path.file_name().map_or_else(OsString::new, OsString::from);
+    fs::canonicalize(folder_of(path)).unwrap_or_else(|_| folder_of(path).to_owned()).join(name)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+fn check_input(path: &Path) -> anyhow::Result<()> {
+    let cannot = || format!("cannot read {}", path.display());
+    if fs::metadata(path).with_context(cannot)?.is_dir() {
+        bail!("{} is a folder; name a .gltf or .glb file", path.display());
+    }
+    fs::File::open(path).with_context(cannot)?;
+    Ok(())
+}
+
+/// Whether a file can be put in `path`'s place.
+fn check_target(path: &Path) -> anyhow::Result<()> {
+    match fs::metadata(path) {
+        Ok(found) if !found.is_file() => bail!("cannot write {}: it is not a file", path.display()),
+        _ => {}
+    }
+    temporary_beside(path).map(drop).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Whether `folder` can be made, or written to where it is already there. Makes nothing.
+fn check_picture_folder(folder: &Path) -> anyhow::Result<()> {
+    let nearest = folder.ancestors().find(|f| !f.as_os_str().is_empty() && f.exists());
+    let nearest = nearest.unwrap_or_else(|| Path::new("."));
+    temporary_in(nearest).map(drop).with_context(|| format!("cannot write into {}", folder.display()))
+}
+
+/// Writes `bytes` to a temporary name beside `path` and renames it, so that no half file is ever seen.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    let write = || -> anyhow::Result<()> {
+        let mut file = temporary_beside(path)?;
+        file.write_all(bytes)?;
+        file.as_file().sync_all()?;
+        file.persist(path).map_err(|failed| failed.error)?;
+        Ok(())
+    };
+    write().with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn temporary_beside(path: &Path) -> anyhow::Result<NamedTempFile> {
+    temporary_in(folder_of(path))
+}
+
+fn temporary_in(folder: &Path) -> anyhow::Result<NamedTempFile> {
+    match fs::metadata(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            bail!("the folder {} does not exist; make it first", folder.display())
+        }
+        Ok(found) if !found.is_dir() => bail!("{} is not a folder", folder.display()),
+        _ => {}
+    }
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".cobake-");
+    // A temporary file is private by default; the result is to be as readable as any other new file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    Ok(builder.tempfile_in(folder)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is_wrong_use(files: &Files<'_>) -> bool {
+        files.check().expect_err("refused").is::<WrongUse>()
+    }
+
+    #[test]
+    fn results_may_not_replace_the_input_or_each_other() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let input = folder.path().join("in.glb");
+        let output = folder.path().join("out.glb");
+        let detour = folder.path().join("sub").join("..").join("in.glb");
+        fs::write(&input, b"glTF").expect("written");
+        fs::create_dir(folder.path().join("sub")).expect("made");
+
+        let good = Files { input: &input, output: &output, report: None, pictures: None };
+        good.check().expect("nothing wrong");
+        assert!(is_wrong_use(&Files { output: &input, ..good }));
+        assert!(is_wrong_use(&Files { output: &detour, ..good }));
+        assert!(is_wrong_use(&Files { report: Some(&input), ..good }));
+        assert!(is_wrong_use(&Files { report: Some(&output), ..good }));
+        assert_eq!(fs::read(&input).expect("still there"), b"glTF");
+    }
+
+    #[test]
+    fn checking_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let input = folder.path().join("in.glb");
+        fs::write(&input, b"glTF").expect("written");
+        let (output, pictures) = (folder.path().join("out.glb"), folder.path().join("a").join("b"));
+        let files = Files { input: &input, output: &output, report: None, pictures: Some(&pictures) };
+        files.check().expect("nothing wrong");
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn a_file_is_no_folder() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let input = folder.path().join("in.glb");
+        fs::write(&input, b"glTF").expect("written");
+        let output = input.join("out.glb");
+        let good = Files { input: &input, output: &output, report: None, pictures: None };
+        assert!(good.check().is_err());
+        let inside = folder.path().join("out.glb");
+        assert!(Files { output: &inside, pictures: Some(&input), ..good }.check().is_err());
+        assert!(Files { output: folder.path(), ..good }.check().is_err());
+    }
+
+    #[test]
+    fn a_written_file_replaces_the_old_one_whole() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("report.json");
+        fs::write(&path, b"a longer old report").expect("written");
+        write_whole(&path, b"new").expect("written");
+        assert_eq!(fs::read(&path).expect("read"), b"new");
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_written_file_is_as_readable_as_any_new_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = |path: &Path| fs::metadata(path).expect("there").permissions().mode();
+        let (whole, plain) = (folder.path().join("whole"), folder.path().join("plain"));
+        write_whole(&whole, b"x").expect("written");
+        fs::write(&plain, b"x").expect("written");
+        assert_eq!(mode(&whole), mode(&plain));
+    }
+}
