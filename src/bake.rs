@@ -2,13 +2,36 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
+use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
-use crate::options::BakeOptions;
+use crate::export::{Baked, encode};
+use crate::options::{BakeOptions, Direct, Resolution};
 use crate::progress::{Progress, Stage};
-use crate::raster::Lightmap;
+use crate::raster::{Lightmap, RasterInput, rasterize};
 use crate::report::{Recorder, Report};
 use crate::retriangulate::RadiosityMesh;
-use crate::unwrap::Atlas;
+use crate::retriangulate::mesh::radiosity_mesh;
+use crate::scene::{ImportOptions, Scene};
+use crate::solve::{Problem, Solution, solve};
+use crate::surface::{Geometry, Surface, build_surfaces};
+use crate::trace::Tracer;
+use crate::unwrap::{Atlas, UnwrapOptions, unwrap};
+
+mod account;
+
+/// About how many patches the scene's area is divided into; small surfaces come on top.
+const PATCHES: f64 = 1500.0;
+
+/// Share of a page that charts fill, about: what a texel's size is guessed with before the charts are packed.
+const UTILISATION: f64 = 0.6;
+
+/// With direct light evaluated in texels, elements need not follow its shadows closer than this many texels.
+const TEXELS_AN_ELEMENT: f64 = 4.0;
+
+/// Samples keep this fraction of the scene's diagonal from outlines.
+const NUDGE: f64 = 1e-5;
 
 /// What a bake gives.
 #[derive(Clone, Debug)]
@@ -17,7 +40,11 @@ pub struct BakeResult {
     pub glb: Vec<u8>,
     /// The page that `glb` holds, at full precision.
     pub lightmap: Lightmap,
-    /// The radiosity solution, one entry per surface.
+    /// The planar surfaces of the scene.
+    pub surfaces: Vec<Surface>,
+    /// The elements over them, with what each received.
+    pub facets: Vec<Facet>,
+    /// The solution on conforming triangles, one entry per surface.
     pub mesh: RadiosityMesh,
     /// Where each surface lies in the page, in the same order.
     pub atlas: Atlas,
@@ -33,22 +60,137 @@ pub struct BakeResult {
 /// An option out of its range, a scene that cannot be read or lit, or the caller's wish to stop.
 pub fn bake(path: &Path, options: &BakeOptions, progress: &mut dyn Progress) -> Result<BakeResult, Error> {
     options.validate()?;
-    let mut recorder = Recorder::new(progress);
-    let mut report = Report { options: options.clone(), ..Report::default() };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads)
+        .build()
+        .map_err(|source| Error::Threads { threads: options.threads, source })?;
+    pool.install(|| {
+        let mut recorder = Recorder::new(progress);
+        recorder.begin(Stage::Import);
+        let scene = crate::scene::load(path, &ImportOptions { scene: options.scene })?;
+        run(&scene, options, recorder)
+    })
+}
 
-    recorder.begin(Stage::Import);
-    recorder.warn("the stages are not joined yet: the scene is passed through unlit");
-    let glb = std::fs::read(path).unwrap_or_default();
+/// Bakes a scene that was [loaded](crate::scene::load) before. See [`bake`].
+///
+/// # Errors
+/// As [`bake`]. Runs in the caller's rayon thread pool; `options.threads` has no effect.
+pub fn bake_scene(scene: &Scene, options: &BakeOptions, progress: &mut dyn Progress) -> Result<BakeResult, Error> {
+    options.validate()?;
+    run(scene, options, Recorder::new(progress))
+}
+
+fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<BakeResult, Error> {
+    scene.warnings.iter().for_each(|w| recorder.warn(w));
+    enter(&mut recorder, Stage::Surfaces)?;
+    let tracer = tracer(scene);
+    let set = build_surfaces(&Geometry::from(scene), &tracer);
+    account::warn_of_surfaces(&set, &mut recorder);
+    account::warn_of_reflectance(scene, options, &mut recorder);
+    let surfaces = set.surfaces;
+    let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
+    let scale = Scale::of(&surfaces, options);
+    let mesh_options = MeshOptions {
+        patch_size: scale.patch_size,
+        nudge: NUDGE * tracer.diagonal(),
+        lift: tracer.margin(),
+    };
+    let facets = build(&surfaces, &appearance, mesh_options);
+    let initial = account::leaf_count(&facets);
+
+    enter(&mut recorder, Stage::Solve)?;
+    let problem = Problem {
+        tracer: &tracer,
+        surfaces: &surfaces,
+        appearance: &appearance,
+        lights: &scene.lights,
+        options,
+        patch_size: scale.patch_size,
+        threshold: scale.threshold,
+    };
+    let solution = solve(&problem, facets, &mut |done| {
+        recorder.advance(done);
+        !recorder.is_cancelled()
+    })
+    .ok_or(Error::Cancelled)?;
+
+    enter(&mut recorder, Stage::Retriangulate)?;
+    let (mesh, dropped) = radiosity_mesh(&surfaces, &solution.facets);
+    account::warn_of_dropped(dropped, &mut recorder);
+
+    enter(&mut recorder, Stage::Unwrap)?;
+    let unwrapping = UnwrapOptions { resolution: options.resolution, padding: options.padding };
+    let atlas = unwrap(&surfaces, &unwrapping)?;
+
+    enter(&mut recorder, Stage::Raster)?;
+    let (lightmap, texels) = rasterize(&RasterInput {
+        surfaces: &surfaces,
+        atlas: &atlas,
+        mesh: &mesh,
+        tracer: &tracer,
+        occluders: &solution.occluders,
+        emitters: &solution.emitters,
+        appearance: &appearance,
+        options,
+    });
+
+    enter(&mut recorder, Stage::Export)?;
+    let glb = encode(&Baked {
+        scene,
+        surfaces: &surfaces,
+        atlas: &atlas,
+        lightmap: &lightmap,
+        mesh: &mesh,
+        options,
+    })?;
+    let mut report = Report { options: options.clone(), ..Report::default() };
+    report.elements.initial = initial;
+    account::fill_report(&mut report, scene, &surfaces, &solution);
+    account::fill_texels(&mut report, &atlas, texels);
+    recorder.finish(&mut report);
+    drop(appearance);
+    let Solution { facets, .. } = solution;
+    Ok(BakeResult { glb, lightmap, surfaces, facets, mesh, atlas, report })
+}
+
+fn enter(recorder: &mut Recorder, stage: Stage) -> Result<(), Error> {
     if recorder.is_cancelled() {
         return Err(Error::Cancelled);
     }
+    recorder.begin(stage);
+    Ok(())
+}
 
-    recorder.finish(&mut report);
-    Ok(BakeResult {
-        glb,
-        lightmap: Lightmap { width: 1, height: 1, texels: vec![[0.0; 3]] },
-        mesh: RadiosityMesh::default(),
-        atlas: Atlas { width: 1, height: 1, texels_per_metre: 0.0, padding: 0, charts: Vec::new() },
-        report,
-    })
+fn tracer(scene: &Scene) -> Tracer {
+    let triangles: Vec<[DVec3; 3]> =
+        scene.triangles.iter().map(|t| t.vertices.map(|v| scene.vertices[v as usize])).collect();
+    let double_sided = scene
+        .triangles
+        .iter()
+        .map(|t| scene.materials[scene.placements[t.placement as usize].material].double_sided)
+        .collect();
+    Tracer::new(triangles).with_double_sided(double_sided)
+}
+
+/// Lengths that follow from the scene's area and the lightmap's resolution, metres.
+struct Scale {
+    patch_size: f64,
+    threshold: f64,
+}
+
+impl Scale {
+    fn of(surfaces: &[Surface], options: &BakeOptions) -> Self {
+        let area: f64 = surfaces.iter().map(|s| s.area).sum();
+        let texel = match options.resolution {
+            Resolution::Size(side) => (area / UTILISATION).sqrt() / f64::from(side),
+            Resolution::TexelsPerMetre(density) => 1.0 / density,
+        };
+        let patch_size = (area / PATCHES).sqrt();
+        let threshold = options.subdivision_threshold.unwrap_or(match options.direct {
+            Direct::Mesh => texel,
+            Direct::Texel => TEXELS_AN_ELEMENT * texel,
+        });
+        Self { patch_size: patch_size.max(threshold), threshold }
+    }
 }

@@ -18,4 +18,4 @@ pub mod surface;
 pub mod trace;
 pub mod unwrap;
 
-pub use bake::{BakeResult, bake};
+pub use bake::{BakeResult, bake, bake_scene};

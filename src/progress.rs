@@ -36,8 +36,8 @@ impl Stage {
     }
 }
 
-/// Receives a bake's progress. Called from the thread that called [`bake`](crate::bake()).
-pub trait Progress {
+/// Receives a bake's progress. Called from one thread at a time.
+pub trait Progress: Send {
     /// A stage begins.
     fn begin(&mut self, stage: Stage);
 

@@ -64,6 +64,8 @@ pub struct RasterInput<'a> {
 pub struct TexelCounts {
     /// Texels that lie in a chart or are touched by a lookup inside it.
     pub covered: u64,
+    /// Texels whose direct light was evaluated.
+    pub evaluated: u64,
     /// Texels filled from their neighbours.
     pub dilated: u64,
     /// Evaluations of direct light and rays, emitters times points.
@@ -96,6 +98,9 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
     let (mut texels, mut valid) = (vec![[0.0; 3]; count], vec![false; count]);
     let mut counts = TexelCounts { covered: sites.len() as u64, ..TexelCounts::default() };
     for (lit, effort) in &lit {
+        if input.options.direct == Direct::Texel {
+            counts.evaluated += lit.len() as u64;
+        }
         counts.effort.add(*effort);
         for texel in lit {
             let site = &sites[texel.site];

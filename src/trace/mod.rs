@@ -221,6 +221,12 @@ impl Facing {
     }
 }
 
+impl crate::surface::BoxQuery for Tracer {
+    fn triangles_in(&self, bounds: Bounds, out: &mut Vec<u32>) {
+        Tracer::triangles_in(self, bounds, out);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,0 +1,115 @@
+//! What a bake reports about itself.
+
+use glam::DVec3;
+
+use crate::cob::{Cob, CobState};
+use crate::element::Facet;
+use crate::options::BakeOptions;
+use crate::progress::Progress;
+use crate::raster::TexelCounts;
+use crate::report::Report;
+use crate::scene::Scene;
+use crate::solve::Solution;
+use crate::surface::{Surface, SurfaceSet};
+use crate::unwrap::Atlas;
+
+/// Says which contacts were lost.
+pub(super) fn warn_of_surfaces(set: &SurfaceSet, progress: &mut dyn Progress) {
+    if set.dropped_contacts > 0 {
+        progress.warn(&format!(
+            "{} contact lines between surfaces could not be used; light may leak along them",
+            set.dropped_contacts
+        ));
+    }
+}
+
+/// Names the materials whose reflectance was clamped.
+pub(super) fn warn_of_reflectance(scene: &Scene, options: &BakeOptions, progress: &mut dyn Progress) {
+    let mut used = vec![false; scene.materials.len()];
+    scene.placements.iter().for_each(|p| used[p.material] = true);
+    let clamped: Vec<&str> = scene
+        .materials
+        .iter()
+        .zip(used)
+        .filter(|(m, used)| *used && m.reflectance.max_element() > options.max_reflectance)
+        .map(|(m, _)| m.name.as_str())
+        .collect();
+    if !clamped.is_empty() {
+        progress.warn(&format!(
+            "reflectance clamped to {} for {}; light would hardly die out otherwise (--max-reflectance)",
+            options.max_reflectance,
+            listed(&clamped)
+        ));
+    }
+}
+
+/// The first few names, and how many more there are.
+fn listed(names: &[&str]) -> String {
+    const MOST: usize = 4;
+    let mut text = names.iter().take(MOST).map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ");
+    if names.len() > MOST {
+        text += &format!(" and {} more", names.len() - MOST);
+    }
+    text
+}
+
+/// Says that vertices or edges were lost.
+pub(super) fn warn_of_dropped(dropped: usize, progress: &mut dyn Progress) {
+    if dropped > 0 {
+        progress.warn(&format!("{dropped} points or edges of the mesh could not be triangulated and were left out"));
+    }
+}
+
+pub(super) fn leaf_count(facets: &[Facet]) -> u64 {
+    facets.iter().map(|f| f.leaves().count() as u64).sum()
+}
+
+/// Fills in what the solver did.
+pub(super) fn fill_report(report: &mut Report, scene: &Scene, surfaces: &[Surface], solution: &Solution) {
+    report.scene.triangles = scene.triangles.len() as u64;
+    report.scene.surfaces = surfaces.len() as u64;
+    report.scene.lights = scene.lights.len() as u64;
+    report.scene.emitters = surfaces
+        .iter()
+        .filter(|s| scene.materials[s.material].emission.cmpgt(DVec3::ZERO).any())
+        .count() as u64;
+    report.elements.at_end = leaf_count(&solution.facets);
+    report.elements.splits.cob = solution.direct.cob_splits;
+    report.elements.splits.gradient = solution.direct.gradient_splits + solution.delivery.splits;
+    report.elements.splits.uniform = solution.direct.uniform_splits;
+    for facet in &solution.facets {
+        for element in &facet.elements {
+            match element.cob.state() {
+                CobState::Uninitialized => report.cob.uninitialized += 1,
+                CobState::Empty => report.cob.empty += 1,
+                CobState::NotEmpty => report.cob.not_empty += 1,
+            }
+        }
+        report.cob.bytes_total += (facet.elements.len() * size_of::<Cob>() + facet.cobs.bytes()) as u64;
+    }
+    report.cob.bytes_per_empty = size_of::<Cob>() as f64;
+    report.cob.seconds = solution.direct.cob_time.as_secs_f64();
+    report.cob.splits = solution.direct.cob_splits;
+    report.cob.splits_saved_by_shaft = solution.direct.saved_by_shaft;
+    report.cob.splits_saved_by_umbra = solution.direct.saved_by_umbra;
+    report.shots = solution.shots;
+    report.rays = solution.rays;
+    report.energy.emitted = solution.energy.emitted;
+    report.energy.absorbed = solution.energy.absorbed;
+    report.energy.escaped = solution.energy.escaped;
+    report.energy.unshot = solution.energy.unshot;
+}
+
+/// Fills in what became of the texels.
+pub(super) fn fill_texels(report: &mut Report, atlas: &Atlas, texels: TexelCounts) {
+    report.rays += texels.effort.rays;
+    report.texels.covered = texels.covered;
+    report.texels.evaluated = texels.evaluated;
+    report.texels.dilated = texels.dilated;
+    report.lightmap.width = atlas.width;
+    report.lightmap.height = atlas.height;
+    report.lightmap.texels_per_metre = atlas.texels_per_metre;
+    report.lightmap.charts = atlas.charts.len() as u64;
+    let all = f64::from(atlas.width) * f64::from(atlas.height);
+    report.lightmap.utilisation = texels.covered as f64 / all.max(1.0);
+}
