@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 
 pub(crate) use arrange::{Arrangement, PlaneInput, arrange};
 pub use conform::conform;
-pub(crate) use subdivide::{Subdivision, subdivide};
+pub(crate) use subdivide::{Face, Subdivision, subdivide};
 
 /// A planar region to triangulate.
 #[derive(Clone, Copy, Debug)]
