@@ -1,8 +1,62 @@
 //! Stage 2: coplanar connected triangles of one material become one planar polygon.
 
-use glam::DVec2;
+//!
+//! In order: a placement's triangles get shared vertices ([`weld`], [`facet`]), coplanar neighbours
+//! are grouped ([`group`]) and outlined ([`outline`], [`boundary`]); then triangles that meet or cut a
+//! surface are found ([`contact`]) and cut it into regions ([`dangling`], [`region`]).
+
+mod boundary;
+mod build;
+mod contact;
+mod dangling;
+mod facet;
+mod group;
+mod outline;
+mod region;
+mod weld;
+
+use glam::{DVec2, DVec3};
+
+pub use build::build_surfaces;
+pub use contact::BoxQuery;
 
 use crate::geom::{Frame, Ring};
+use crate::scene::{Placement, Scene, Triangle};
+
+/// What of a scene makes surfaces.
+#[derive(Clone, Debug)]
+pub struct Geometry<'a> {
+    /// World-space positions, metres.
+    pub vertices: &'a [DVec3],
+    /// All triangles.
+    pub triangles: &'a [Triangle],
+    /// Which of them belong together.
+    pub placements: &'a [Placement],
+    /// For each material whether both sides reflect.
+    pub double_sided: Vec<bool>,
+}
+
+impl<'a> From<&'a Scene> for Geometry<'a> {
+    fn from(scene: &'a Scene) -> Self {
+        Self {
+            vertices: &scene.vertices,
+            triangles: &scene.triangles,
+            placements: &scene.placements,
+            double_sided: scene.materials.iter().map(|m| m.double_sided).collect(),
+        }
+    }
+}
+
+/// A scene's surfaces.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceSet {
+    /// In the order of their placements, within one in the order of their first triangles.
+    pub surfaces: Vec<Surface>,
+    /// Triangles in no surface: those without area, and those with a position that is not finite.
+    pub without_area: usize,
+    /// Contact lines that could not be used; light may leak along them.
+    pub dropped_contacts: usize,
+}
 
 /// A maximal connected coplanar group of one placement's triangles.
 ///

@@ -1,7 +1,0 @@
-//! stub
-use super::{PlanarRegion, Triangulation};
-/// stub
-#[must_use]
-pub fn triangulate(_: PlanarRegion) -> Triangulation {
-    Triangulation::default()
-}
