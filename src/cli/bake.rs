@@ -51,12 +51,15 @@ fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
 
     if let Some(folder) = files.pictures {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-        let lightmap = picture::of_lightmap(&result.lightmap);
-        let mesh = picture::of_mesh(&result.mesh, &result.atlas, &lightmap);
-        for (name, image) in [("lightmap.png", lightmap), ("mesh.png", mesh)] {
-            let path = folder.join(name);
-            let png = picture::to_png(&image).with_context(|| format!("cannot write {}", path.display()))?;
-            write_whole(&path, &png)?;
+        let subject = picture::Subject {
+            lightmap: &result.lightmap,
+            surfaces: &result.surfaces,
+            facets: &result.facets,
+            mesh: &result.mesh,
+        };
+        let pictures = picture::pictures(subject).context("cannot draw the pictures")?;
+        for (name, png) in pictures {
+            write_whole(&folder.join(name), &png)?;
         }
     }
     if let Some(path) = files.report {

@@ -4,12 +4,14 @@
 //! without a viewer. Everything here takes plain data, polygons and colours, and knows no stage's
 //! types but the lightmap's. Pictures carry no text; the caller's file names say what they show.
 
+mod bake;
 mod canvas;
 mod drawing;
 mod lightmap;
 mod png;
 mod tone;
 
+pub use bake::{Picture, Subject, pictures};
 pub use drawing::{Cell, Line, MeshDrawing};
 pub use lightmap::lightmap_png;
 pub use tone::ToneMap;
