@@ -14,8 +14,8 @@ use std::io::Cursor;
 use ::exr::math::Vec2;
 use ::exr::meta::attribute::LineOrder;
 use ::exr::prelude::{
-    Blocks, Compression, Encoding, Image, IntoSample, ReadChannels, ReadLayers, ReadSpecificChannel,
-    SpecificChannels, WritableImage, f16, read,
+    Blocks, Compression, Encoding, Image, IntoSample, ReadChannels, ReadLayers, SpecificChannels,
+    WritableImage, f16, read,
 };
 
 use super::ExportError;

@@ -33,6 +33,8 @@ pub(super) struct Plan {
     pub(super) unlit_materials: BTreeSet<usize>,
     /// The surface of each triangle of the scene.
     pub(super) surface_of: Vec<Option<usize>>,
+    /// The surfaces of each placement.
+    surfaces: BTreeMap<usize, Vec<usize>>,
 }
 
 impl Plan {
@@ -65,9 +67,18 @@ impl Plan {
                 node.placements.push(index);
             }
         }
-        let mut plan = Self { nodes, unlit_materials: BTreeSet::new(), surface_of };
+        let mut surfaces: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (index, surface) in baked.surfaces.iter().enumerate() {
+            surfaces.entry(surface.placement).or_default().push(index);
+        }
+        let mut plan = Self { nodes, unlit_materials: BTreeSet::new(), surface_of, surfaces };
         plan.assign_meshes(baked, &by_node);
         Ok(plan)
+    }
+
+    /// The surfaces of a placement, in order.
+    pub(super) fn surfaces_of(&self, placement: usize) -> &[usize] {
+        self.surfaces.get(&placement).map_or(&[], Vec::as_slice)
     }
 
     fn assign_meshes(&mut self, baked: &Baked, lit: &BTreeMap<usize, usize>) {
