@@ -179,6 +179,7 @@ fn shape(kind: &str, component: usize) -> Option<(usize, usize)> {
 }
 
 /// Where an accessor's elements lie in a view.
+#[derive(Clone, Copy)]
 struct Run {
     offset: usize,
     count: usize,

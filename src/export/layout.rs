@@ -163,7 +163,7 @@ pub(super) fn forget_extensions(root: &mut Object, names: &[&str]) {
 mod tests {
     use super::*;
 
-    fn packed(views: Value, buffers: &[Vec<u8>]) -> (Object, Vec<u8>) {
+    fn packed(views: &Value, buffers: &[Vec<u8>]) -> (Object, Vec<u8>) {
         let mut root = json!({"bufferViews": views, "buffers": [{"byteLength": 1, "uri": "x", "name": "n"}]})
             .as_object()
             .unwrap()
@@ -183,7 +183,7 @@ mod tests {
             {"buffer": 0},
             {"buffer": 1, "byteOffset": 8, "byteLength": 4},
         ]);
-        let (root, binary) = packed(views, &buffers);
+        let (root, binary) = packed(&views, &buffers);
         let bytes = |view: usize| {
             let view = root["bufferViews"][view].as_object().unwrap();
             assert_eq!(view["buffer"], 0);

@@ -20,13 +20,16 @@ use crate::scene::Placement;
 /// glTF's primitive mode of triangle lists.
 const TRIANGLES: u64 = 4;
 
+/// Contents and the accessor that holds them.
+type Known<T> = Vec<(Vec<T>, usize)>;
+
 /// Accessors that were written anew, so that instances can share them.
 #[derive(Debug, Default)]
 pub(super) struct Rewritten {
     /// By source accessor: the table of source vertices, and the new accessor.
-    attributes: BTreeMap<usize, Vec<(Vec<u32>, usize)>>,
+    attributes: BTreeMap<usize, Known<u32>>,
     /// By mesh and primitive: the triangles, and their accessor.
-    indices: BTreeMap<(usize, usize), Vec<(Vec<[u32; 3]>, usize)>>,
+    indices: BTreeMap<(usize, usize), Known<[u32; 3]>>,
 }
 
 /// Placements that draw from the same vertices: their attributes and targets are equal.
