@@ -1,5 +1,78 @@
 //! Stage 8: EXR, PNG and glTF; written under a temporary name, read back, then renamed.
+//!
+//! The output is the input document with lightmaps in it. Each lit node's mesh has `TEXCOORD_1`;
+//! lit materials carry `MOZ_lightmap` with an 8-bit PNG that any loader reads; and the map at full
+//! precision is an EXR in a bufferView that only our own extension `COBAKE_lightmap` names, since
+//! an EXR among the document's images makes loaders fail. Neither extension is ever required.
+//!
+//! `MOZ_lightmap` is irradiance by definition. With [`Quantity::Radiance`] its intensity is scaled by
+//! π, so that it still shows the irradiance; with [`Quantity::Radiosity`] there is no such factor and
+//! the file holds the EXR alone.
+//!
+//! What is not lit stays as it was: nodes, names, animations, skins, cameras, lights, extras, and
+//! extensions that nobody here knows. With [`Topology::Source`] the triangles stay as well.
+//!
+//! [`Quantity::Radiance`]: crate::options::Quantity::Radiance
+//! [`Quantity::Radiosity`]: crate::options::Quantity::Radiosity
+//! [`Topology::Source`]: crate::options::Topology::Source
 
+mod accessor;
+mod adaptive;
+mod document;
 mod error;
+mod exr;
+mod glb;
+mod interpolation;
+mod layout;
+mod materials;
+mod plan;
+mod png;
+mod pool;
+mod primitive;
+mod references;
+mod source;
+mod transform;
+mod verify;
+mod write;
+mod writer;
 
 pub use error::ExportError;
+pub use exr::{decode_exr, encode_exr};
+pub use png::{Png, encode_png};
+pub use verify::verify;
+pub use write::write;
+
+use crate::options::BakeOptions;
+use crate::raster::Lightmap;
+use crate::retriangulate::RadiosityMesh;
+use crate::scene::Scene;
+use crate::surface::Surface;
+use crate::unwrap::Atlas;
+
+/// The results of a bake, all of one scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Baked<'a> {
+    /// The scene, with the document to write again.
+    pub scene: &'a Scene,
+    /// Its planar surfaces.
+    pub surfaces: &'a [Surface],
+    /// Where each surface lies in the lightmap.
+    pub atlas: &'a Atlas,
+    /// The texels.
+    pub lightmap: &'a Lightmap,
+    /// The solution on its own triangles; written with [`Topology::Adaptive`](crate::options::Topology).
+    pub mesh: &'a RadiosityMesh,
+    /// What the bake was told; says what the texels hold and which geometry to write.
+    pub options: &'a BakeOptions,
+}
+
+/// Encodes the baked document as GLB. The same results give the same bytes.
+///
+/// # Errors
+/// Names what in the document or in the results cannot be written. A document that the `gltf` crate
+/// accepts gives output that it accepts, or [`ExportError::NotReadable`].
+pub fn encode(baked: &Baked) -> Result<Vec<u8>, ExportError> {
+    let glb = writer::write_document(baked)?;
+    verify::still_accepted(&baked.scene.source.json, &glb)?;
+    Ok(glb)
+}

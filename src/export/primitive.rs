@@ -1,0 +1,106 @@
+//! What every lit primitive goes through, whatever its geometry: room for `TEXCOORD_1`, and its materials.
+
+use serde_json::Value;
+
+use super::ExportError;
+use super::document::{Document, Object, edit_object, index_of};
+use super::layout::drop_extensions;
+use super::materials::{LIGHTMAP_SET, Materials, uses_lightmap_set};
+use super::plan::primitive_materials;
+
+/// Geometry compression: its data are of the old geometry.
+pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Frees set 1 of a primitive of `mesh` and gives it materials that carry the lightmap.
+///
+/// A set 1 that a material reads moves to the next free set; one that nobody reads goes.
+pub(super) fn prepare(
+    document: &mut Document,
+    materials: &mut Materials,
+    primitive: &mut Object,
+    mesh: usize,
+) -> Result<(), ExportError> {
+    if drop_extensions(primitive, &[DRACO]) && !has_data(document, primitive) {
+        return Err(ExportError::Compressed { list: "mesh", index: mesh, extension: DRACO });
+    }
+    let list = document.source.json.get("materials");
+    let read = primitive_materials(primitive)
+        .into_iter()
+        .filter_map(|index| list.and_then(|list| list.get(index)))
+        .any(uses_lightmap_set);
+    let moved = free_set(primitive).filter(|_| read);
+    for attributes in attribute_maps(primitive) {
+        let old = attributes.shift_remove(&set_name(LIGHTMAP_SET));
+        match (old, moved) {
+            (Some(accessor), Some(set)) => {
+                attributes.insert(set_name(set), accessor);
+            }
+            // An earlier bake's filler, see `insert_coordinates`.
+            (Some(accessor), None) if attributes.get(&set_name(0)) == Some(&accessor) => {
+                attributes.shift_remove(&set_name(0));
+            }
+            _ => {}
+        }
+    }
+    let material = index_of(primitive.get("material"));
+    if let Some(variant) = materials.variant(document, material, moved) {
+        primitive.insert("material".into(), variant.into());
+    }
+    let mappings = primitive
+        .get_mut("extensions")
+        .and_then(|extensions| extensions.get_mut("KHR_materials_variants")?.get_mut("mappings"))
+        .and_then(Value::as_array_mut);
+    for mapping in mappings.into_iter().flatten().filter_map(Value::as_object_mut) {
+        let variant = materials.variant(document, index_of(mapping.get("material")), moved);
+        if let Some(variant) = variant {
+            mapping.insert("material".into(), variant.into());
+        }
+    }
+    Ok(())
+}
+
+/// Puts the lightmap's coordinates on a primitive.
+///
+/// glTF demands that sets count from 0 without gaps. Where there is no set 0, nothing reads it
+/// either, so the same accessor stands in for it and costs no bytes.
+pub(super) fn insert_coordinates(primitive: &mut Object, accessor: usize) {
+    edit_object(primitive, "attributes", |attributes| {
+        if !attributes.contains_key(&set_name(0)) {
+            attributes.insert(set_name(0), accessor.into());
+        }
+        attributes.insert(set_name(LIGHTMAP_SET), accessor.into());
+    });
+}
+
+/// The attribute of a texture coordinate set.
+pub(super) fn set_name(set: usize) -> String {
+    format!("TEXCOORD_{set}")
+}
+
+/// The primitive's attributes and those of its morph targets.
+pub(super) fn attribute_maps(primitive: &mut Object) -> Vec<&mut Object> {
+    let mut maps = Vec::new();
+    for (key, value) in primitive {
+        match (key.as_str(), value) {
+            ("attributes", Value::Object(attributes)) => maps.push(attributes),
+            ("targets", Value::Array(targets)) => {
+                maps.extend(targets.iter_mut().filter_map(Value::as_object_mut));
+            }
+            _ => {}
+        }
+    }
+    maps
+}
+
+/// The first set beyond the lightmap's that the primitive does not have.
+fn free_set(primitive: &Object) -> Option<usize> {
+    let attributes = primitive.get("attributes")?.as_object()?;
+    (LIGHTMAP_SET + 1..).take(attributes.len() + 1).find(|&set| !attributes.contains_key(&set_name(set)))
+}
+
+/// Whether the positions can be read without a decoder.
+fn has_data(document: &Document, primitive: &Object) -> bool {
+    let position = index_of(primitive.get("attributes").and_then(|attributes| attributes.get("POSITION")));
+    let accessor = position.and_then(|position| document.list("accessors").get(position));
+    accessor.is_some_and(|accessor| accessor.get("bufferView").is_some() || accessor.get("sparse").is_some())
+}

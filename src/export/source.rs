@@ -1,0 +1,171 @@
+//! `--topology source`: the input's own triangles with a second set of texture coordinates.
+//!
+//! Where no vertex has to be split, a primitive keeps its accessors and only `TEXCOORD_1` is new.
+//! Where one has, every attribute and morph target is written anew, byte for byte, with the copies
+//! at the end; instances whose tables of copies are equal share the result. Strips and fans become
+//! lists, since their corners cannot be split.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::ExportError;
+use super::accessor;
+use super::document::{Document, Object, Target, index_of};
+use super::pool::{self, Pool};
+use super::primitive::{attribute_maps, insert_coordinates, prepare};
+use super::writer::Writer;
+use crate::scene::Placement;
+
+/// glTF's primitive mode of triangle lists.
+const TRIANGLES: u64 = 4;
+
+/// Contents and the accessor that holds them.
+type Known<T> = Vec<(Vec<T>, usize)>;
+
+/// Accessors that were written anew, so that instances can share them.
+#[derive(Debug, Default)]
+pub(super) struct Rewritten {
+    /// By source accessor: the table of source vertices, and the new accessor.
+    attributes: BTreeMap<usize, Known<u32>>,
+    /// By mesh and primitive: the triangles, and their accessor.
+    indices: BTreeMap<(usize, usize), Known<[u32; 3]>>,
+}
+
+/// Placements that draw from the same vertices: their attributes and targets are equal.
+struct Group<'a> {
+    attributes: Option<Value>,
+    targets: Option<Value>,
+    placements: Vec<&'a Placement>,
+}
+
+/// Gives those of a node's `primitives` that `placements` name their lightmap coordinates.
+pub(super) fn rewrite(
+    writer: &mut Writer,
+    placements: &[&Placement],
+    primitives: &mut [Value],
+) -> Result<(), ExportError> {
+    for group in group(placements, primitives)? {
+        let count = vertex_count(writer, &group)?;
+        let pool = pool::build(writer.baked, &writer.plan.surface_of, &group.placements, count)?;
+        let coordinates = writer.document.add_floats(pool.coordinates.as_flattened(), 2);
+        for (placement, corners) in group.placements.iter().zip(&pool.corners) {
+            let primitive = primitives.get_mut(placement.primitive).and_then(Value::as_object_mut);
+            let primitive = primitive.ok_or_else(|| not_there(placement))?;
+            prepare(&mut writer.document, &mut writer.materials, primitive, placement.mesh)?;
+            if !pool.unsplit {
+                for attributes in attribute_maps(primitive) {
+                    for value in attributes.values_mut() {
+                        if let Some(accessor) = index_of(Some(value)) {
+                            *value = expand(writer, accessor, &pool, count)?.into();
+                        }
+                    }
+                }
+            }
+            insert_coordinates(primitive, coordinates);
+            let mode = primitive.get("mode").and_then(Value::as_u64).unwrap_or(TRIANGLES);
+            if !pool.unsplit || mode != TRIANGLES {
+                let indices = list_of_triangles(writer, placement, corners, pool.sources.len());
+                primitive.insert("indices".into(), indices.into());
+                primitive.shift_remove("mode");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Sorts placements by the vertices that they draw from.
+fn group<'a>(placements: &[&'a Placement], primitives: &[Value]) -> Result<Vec<Group<'a>>, ExportError> {
+    let mut groups: Vec<Group> = Vec::new();
+    for &placement in placements {
+        let primitive = primitives.get(placement.primitive).ok_or_else(|| not_there(placement))?;
+        let (attributes, targets) = (primitive.get("attributes"), primitive.get("targets"));
+        let same = |g: &&mut Group| {
+            g.attributes.as_ref() == attributes
+                && g.targets.as_ref() == targets
+                && g.placements.first().is_some_and(|first| first.vertices.len() == placement.vertices.len())
+        };
+        match groups.iter_mut().find(same) {
+            Some(group) => group.placements.push(placement),
+            None => groups.push(Group {
+                attributes: attributes.cloned(),
+                targets: targets.cloned(),
+                placements: vec![placement],
+            }),
+        }
+    }
+    Ok(groups)
+}
+
+/// The group's number of vertices, the same in the scene and in the document.
+fn vertex_count(writer: &Writer, group: &Group) -> Result<usize, ExportError> {
+    let held = group.placements.first().map_or(0, |first| first.vertices.len());
+    let position = group.attributes.as_ref().and_then(|attributes| index_of(attributes.get("POSITION")));
+    let accessor = position.and_then(|position| writer.document.list("accessors").get(position));
+    match accessor.and_then(|accessor| index_of(accessor.get("count"))) {
+        Some(count) if count == held => Ok(count),
+        _ => Err(ExportError::Mismatch { what: "vertices" }),
+    }
+}
+
+/// The accessor that holds `accessor`'s elements in the pool's order.
+fn expand(writer: &mut Writer, accessor: usize, pool: &Pool, count: usize) -> Result<usize, ExportError> {
+    let known = writer.rewritten.attributes.get(&accessor);
+    let known = known.and_then(|list| list.iter().find(|(sources, _)| *sources == pool.sources));
+    if let Some(&(_, made)) = known {
+        return Ok(made);
+    }
+    let elements = accessor::read(writer.document.source, accessor, count)?;
+    let stride = elements.size.next_multiple_of(4);
+    let mut bytes = Vec::with_capacity(pool.sources.len() * stride);
+    for &source in &pool.sources {
+        bytes.extend_from_slice(elements.element(source).unwrap_or_default());
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+    let original = writer.document.list("accessors").get(accessor).and_then(Value::as_object);
+    let mut description: Object = original.cloned().unwrap_or_default();
+    description.shift_remove("sparse");
+    description.insert("count".into(), pool.sources.len().into());
+    if !pool.complete && (description.contains_key("min") || description.contains_key("max")) {
+        match elements.extremes(&pool.sources) {
+            Some((min, max)) => {
+                description.insert("min".into(), min.into());
+                description.insert("max".into(), max.into());
+            }
+            None => {
+                description.shift_remove("min");
+                description.shift_remove("max");
+            }
+        }
+    }
+    let made = writer.document.add_accessor(description, Target::Vertices(stride), &bytes);
+    writer.rewritten.attributes.entry(accessor).or_default().push((pool.sources.clone(), made));
+    Ok(made)
+}
+
+/// The accessor that holds a placement's triangles.
+fn list_of_triangles(
+    writer: &mut Writer,
+    placement: &Placement,
+    corners: &[[u32; 3]],
+    vertices: usize,
+) -> usize {
+    let document: &mut Document = &mut writer.document;
+    let list = writer.rewritten.indices.entry((placement.mesh, placement.primitive)).or_default();
+    match list.iter().find(|(known, _)| known == corners) {
+        Some(&(_, made)) => made,
+        None => {
+            let made = document.add_triangles(corners, vertices);
+            list.push((corners.to_vec(), made));
+            made
+        }
+    }
+}
+
+fn not_there(placement: &Placement) -> ExportError {
+    ExportError::Malformed {
+        list: "mesh",
+        index: placement.mesh,
+        problem: "lacks a primitive that was baked",
+    }
+}
