@@ -196,7 +196,8 @@ mod tests {
 
     #[test]
     fn a_circle_keeps_its_area() {
-        let ring: Ring = (0..1000).map(|i| DVec2::from_angle(f64::from(i) * 0.001 * std::f64::consts::TAU)).collect();
+        let ring: Ring =
+            (0..1000).map(|i| DVec2::from_angle(f64::from(i) * 0.001 * std::f64::consts::TAU)).collect();
         let kept = simplified_corners_keeping_area(&ring, 1e-2, 1e-6);
         let rest: Ring = kept.iter().map(|&i| ring[i]).collect();
         assert!((signed_area(&rest) / signed_area(&ring) - 1.0).abs() <= 1e-6);

@@ -195,8 +195,11 @@ impl Builder {
 
     /// One round: finds all vertices on edges and all crossings, and cuts. `false` when there were none.
     fn cut(&mut self) -> bool {
-        let segments: Vec<[DVec2; 2]> =
-            self.edges.iter().map(|e| [self.vertices[e.from as usize], self.vertices[e.to as usize]]).collect();
+        let segments: Vec<[DVec2; 2]> = self
+            .edges
+            .iter()
+            .map(|e| [self.vertices[e.from as usize], self.vertices[e.to as usize]])
+            .collect();
         let grid = EdgeGrid::new(Extent { low: self.low, high: self.high, margin: self.snap }, &segments);
         let mut cuts: Vec<Cuts> = vec![Vec::new(); self.edges.len()];
         self.find_vertices_on_edges(&segments, &grid, &mut cuts);
@@ -228,7 +231,11 @@ impl Builder {
             for &e in grid.edges_near(p) {
                 let edge = self.edges[e as usize];
                 let [a, b] = segments[e as usize];
-                if polygon::nearest_on_segment(a, b, p).distance(p) <= self.tolerance(edge) {
+                let tolerance = self.tolerance(edge);
+                // What is that near an end of a contact edge is no more on it than the end is, and bending
+                // there and back would go on for ever.
+                let near_end = edge.winding == 0 && a.distance(p).min(b.distance(p)) <= tolerance;
+                if !near_end && polygon::nearest_on_segment(a, b, p).distance(p) <= tolerance {
                     record(&mut cuts[e as usize], edge, segments[e as usize], (id as u32, p));
                 }
             }
@@ -325,10 +332,8 @@ mod tests {
 
     #[test]
     fn crossing_contacts_get_a_vertex() {
-        let contacts = [
-            [DVec2::new(0.25, 0.5), DVec2::new(0.75, 0.5)],
-            [DVec2::new(0.5, 0.25), DVec2::new(0.5, 0.75)],
-        ];
+        let contacts =
+            [[DVec2::new(0.25, 0.5), DVec2::new(0.75, 0.5)], [DVec2::new(0.5, 0.25), DVec2::new(0.5, 0.75)]];
         let result = arranged(&[square(1.0)], &contacts);
         assert_eq!(result.vertices.len(), 4 + 5);
         assert_eq!(result.edges.iter().filter(|e| e.contact).count(), 4);
@@ -371,9 +376,11 @@ mod tests {
     fn what_is_not_finite_is_counted() {
         let rings = [square(1.0), vec![DVec2::NAN; 3]];
         let contacts = [[DVec2::new(f64::INFINITY, 0.0), DVec2::ONE]];
-        let result = arrange(PlaneInput { rings: &rings, contacts: &contacts, points: &[DVec2::NAN], snap: 0.0 });
+        let result =
+            arrange(PlaneInput { rings: &rings, contacts: &contacts, points: &[DVec2::NAN], snap: 0.0 });
         assert_eq!((result.dropped, result.edges.len()), (3, 4));
-        let nothing = arrange(PlaneInput { rings: &[], contacts: &[], points: &[DVec2::ONE], snap: f64::NAN });
+        let nothing =
+            arrange(PlaneInput { rings: &[], contacts: &[], points: &[DVec2::ONE], snap: f64::NAN });
         assert_eq!((nothing.dropped, nothing.vertices.len()), (1, 0));
     }
 }

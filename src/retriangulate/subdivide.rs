@@ -83,7 +83,8 @@ fn inside_faces(vertices: &[DVec2], edges: &[Edge]) -> (Vec<Face>, usize) {
         .collect();
     let Ok(mut plane) = Plane::bulk_load(sites) else { return (Vec::new(), edges.len()) };
     let (marks, refused) = constrain(&mut plane, vertices, edges);
-    let windings = face_windings(&plane, &marks).unwrap_or_else(|| face_windings_by_point(&plane, vertices, edges));
+    let windings =
+        face_windings(&plane, &marks).unwrap_or_else(|| face_windings_by_point(&plane, vertices, edges));
     (collect_faces(&plane, &marks, &windings), refused)
 }
 
@@ -95,7 +96,9 @@ fn constrain(plane: &mut Plane, vertices: &[DVec2], edges: &[Edge]) -> (Vec<Mark
     }
     let mut marks = vec![Mark::default(); plane.num_undirected_edges()];
     let mut refused = 0;
-    for edge in edges {
+    // Rings first: what they cross later is refused, not they.
+    let (rings, contacts): (Vec<&Edge>, Vec<&Edge>) = edges.iter().partition(|e| e.winding != 0);
+    for edge in rings.into_iter().chain(contacts) {
         let ends = (handles[edge.from as usize], handles[edge.to as usize]);
         let (Some(from), Some(to)) = ends else {
             refused += 1;

@@ -59,7 +59,9 @@ fn check(rings: &[Ring], t: &Triangulation) {
         let middle = t.vertices[a as usize].midpoint(t.vertices[b as usize]);
         let distance = rings
             .iter()
-            .flat_map(|r| (0..r.len()).map(|i| polygon::nearest_on_segment(r[i], r[(i + 1) % r.len()], middle)))
+            .flat_map(|r| {
+                (0..r.len()).map(|i| polygon::nearest_on_segment(r[i], r[(i + 1) % r.len()], middle))
+            })
             .fold(f64::INFINITY, |m, foot| m.min(foot.distance(middle)));
         assert!(distance <= 1e-9 * extent, "edge {a}-{b} has one triangle and lies {distance} off the rings");
     }
@@ -78,14 +80,17 @@ fn a_grid_with_a_hole_conforms() {
     let mut hole = rectangle(DVec2::splat(0.31), DVec2::splat(0.69));
     hole.reverse();
     let rings = [rectangle(DVec2::ZERO, DVec2::ONE), hole];
-    let points: Vec<DVec2> = (0..=16)
-        .flat_map(|i| (0..=16).map(move |j| DVec2::new(f64::from(i), f64::from(j)) / 16.0))
-        .collect();
+    let points: Vec<DVec2> =
+        (0..=16).flat_map(|i| (0..=16).map(move |j| DVec2::new(f64::from(i), f64::from(j)) / 16.0)).collect();
     let t = triangulate(PlanarRegion { rings: &rings, points: &points, snap: 1e-6 });
     check(&rings, &t);
     assert_eq!(t.dropped, 0);
     let in_hole = points.iter().filter(|p| (**p - 0.5).abs().max_element() < 0.19).count();
-    assert_eq!(t.vertices.len(), points.len() - in_hole + 4, "each point inside is a vertex, none in the hole");
+    assert_eq!(
+        t.vertices.len(),
+        points.len() - in_hole + 4,
+        "each point inside is a vertex, none in the hole"
+    );
     let again = triangulate(PlanarRegion { rings: &rings, points: &points, snap: 1e-6 });
     assert_eq!(t, again);
 }
@@ -94,7 +99,8 @@ fn a_grid_with_a_hole_conforms() {
 fn points_near_the_boundary_enter_it() {
     let rings = [rectangle(DVec2::ZERO, DVec2::ONE)];
     for offset in [0.0, 1e-17, 1e-13, 1e-12, 1e-9, 9e-7] {
-        let points = [(0.5, offset), (0.5, -offset), (1.0 - offset, 0.25), (0.25, 1.0 + offset)].map(DVec2::from);
+        let points =
+            [(0.5, offset), (0.5, -offset), (1.0 - offset, 0.25), (0.25, 1.0 + offset)].map(DVec2::from);
         let t = triangulate(PlanarRegion { rings: &rings, points: &points, snap: 1e-6 });
         check(&rings, &t);
         assert_eq!(t.vertices.len(), 7, "offset {offset}");
@@ -195,7 +201,10 @@ fn random_regions_conform() {
         assert_eq!(t.dropped, 0, "seed {seed}");
         for p in points.iter().filter(|p| polygon::contains(&rings, **p)) {
             let nearest = t.vertices.iter().map(|v| v.distance(*p)).fold(f64::INFINITY, f64::min);
-            assert!(nearest <= 2.0 * snap + 1e-10 * scale, "seed {seed}: {p} is no vertex, nearest {nearest}");
+            assert!(
+                nearest <= 2.0 * snap + 1e-10 * scale,
+                "seed {seed}: {p} is no vertex, nearest {nearest}"
+            );
         }
     }
 }
@@ -219,8 +228,9 @@ fn random_rubbish_never_panics() {
                 .collect();
             rings.push(ring);
         }
-        let points: Vec<DVec2> =
-            (0..random.below(60)).map(|_| (random.point(1.2) * lattice * 2.0).round() / lattice / 2.0 * scale).collect();
+        let points: Vec<DVec2> = (0..random.below(60))
+            .map(|_| (random.point(1.2) * lattice * 2.0).round() / lattice / 2.0 * scale)
+            .collect();
         let contacts: Vec<[DVec2; 2]> = (0..random.below(20))
             .map(|_| [random.point(1.2) * scale, (random.point(1.0) * lattice).round() / lattice * scale])
             .collect();
@@ -231,7 +241,10 @@ fn random_rubbish_never_panics() {
         assert_eq!((&first.vertices, &first.faces), (&second.vertices, &second.faces));
         for (id, face) in (0..).zip(&first.faces) {
             for neighbour in face.neighbours.into_iter().flatten() {
-                assert!(first.faces[neighbour as usize].neighbours.contains(&Some(id)), "one-sided neighbours");
+                assert!(
+                    first.faces[neighbour as usize].neighbours.contains(&Some(id)),
+                    "one-sided neighbours"
+                );
             }
         }
     }

@@ -100,8 +100,11 @@ mod tests {
     const FLOOR: Frame = Frame { origin: DVec3::ZERO, u: DVec3::X, v: DVec3::Y, normal: DVec3::Z };
 
     fn cut_at(heights: [f64; 3], sides: Sides) -> Option<[DVec2; 2]> {
-        let points =
-            [DVec3::new(0.0, 0.0, heights[0]), DVec3::new(1.0, 0.0, heights[1]), DVec3::new(0.0, 1.0, heights[2])];
+        let points = [
+            DVec3::new(0.0, 0.0, heights[0]),
+            DVec3::new(1.0, 0.0, heights[1]),
+            DVec3::new(0.0, 1.0, heights[2]),
+        ];
         cut(&FLOOR, points, 1e-6, sides)
     }
 

@@ -33,11 +33,10 @@ pub(super) fn extensions(arrangement: &Arrangement, rings: &[Ring], snap: f64) -
         .flatten()
         .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
     let mut ends = free_ends(arrangement);
-    ends.retain(|e| e.chain_length >= SHORTEST_CHAIN * (high - low).length() && polygon::contains(rings, e.end));
+    ends.retain(|e| e.chain_length >= SHORTEST_CHAIN * (high - low).length());
     ends.sort_by(|a, b| b.chain_length.total_cmp(&a.chain_length).then(a.vertex.cmp(&b.vertex)));
-    ends.truncate(MOST_EXTENSIONS);
     let mut further: Vec<[DVec2; 2]> = Vec::new();
-    for free in ends {
+    for free in ends.into_iter().filter(|e| polygon::contains(rings, e.end)).take(MOST_EXTENSIONS) {
         let ring_and_contact = arrangement
             .edges
             .iter()

@@ -10,6 +10,7 @@ use glam::DVec3;
 use super::Geometry;
 use super::weld::{position_noise, weld};
 use crate::geom::{Bounds, triangle};
+use crate::scene::Triangle;
 
 /// A triangle that has area.
 #[derive(Clone, Debug)]
@@ -29,7 +30,7 @@ pub(super) struct Facet {
     pub(super) height: f64,
 }
 
-/// The facets of one placement.
+/// The facets of one placement, or of some of it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Facets {
     /// World-space positions, metres.
@@ -38,8 +39,6 @@ pub(super) struct Facets {
     pub(super) facets: Vec<Facet>,
     /// How far two copies of one position may be apart, metres.
     pub(super) noise: f64,
-    /// Triangles without an area that could be told from none.
-    pub(super) without_area: usize,
 }
 
 /// A triangle is without area when it is thinner than this against its longest edge: f64 rounding
@@ -47,23 +46,24 @@ pub(super) struct Facets {
 const THINNEST: f64 = 1e-12;
 
 impl Facets {
-    /// The facets of placement `index`.
-    pub(super) fn of(geometry: &Geometry, index: usize) -> Self {
-        let range = geometry.triangles_of(index);
-        let triangles = geometry.triangles.get(range.clone()).unwrap_or(&[]);
+    /// The facets of the scene's triangles with the ascending `indices`. Copies of one position lie
+    /// as far apart as the part's size suggests, and at least `least_noise` metres.
+    pub(super) fn of(geometry: &Geometry, indices: &[usize], least_noise: f64) -> Self {
+        let triangles: Vec<Triangle> =
+            indices.iter().filter_map(|&i| geometry.triangles.get(i).copied()).collect();
         let mut used: Vec<u32> = triangles.iter().flat_map(|t| t.vertices).collect();
         used.sort_unstable();
         used.dedup();
         used.retain(|&v| geometry.vertices.get(v as usize).is_some_and(|p| p.is_finite()));
         let positions: Vec<DVec3> = used.iter().map(|&v| geometry.vertices[v as usize]).collect();
         let bounds = Bounds::of(positions.iter().copied());
-        let noise = position_noise(bounds);
+        let noise = position_noise(bounds).max(least_noise);
         if !(noise > 0.0 && noise.is_finite()) {
-            return Self { without_area: triangles.len(), ..Self::default() };
+            return Self::default();
         }
         let first = weld(&positions, bounds.min, noise);
         let mut facets = Vec::with_capacity(triangles.len());
-        for (triangle, index) in triangles.iter().zip(range) {
+        for (triangle, &index) in triangles.iter().zip(indices) {
             let local = triangle.vertices.map(|v| used.binary_search(&v).ok());
             let [Some(a), Some(b), Some(c)] = local else { continue };
             let points = [positions[a], positions[b], positions[c]];
@@ -73,8 +73,7 @@ impl Facets {
             let ring = if distinct { welded } else { own }.to_vec();
             facets.extend(facet(index, ring, points, noise));
         }
-        let without_area = triangles.len() - facets.len();
-        let mut facets = Self { positions, facets, noise, without_area };
+        let mut facets = Self { positions, facets, noise };
         facets.cut_edges(bounds);
         facets
     }

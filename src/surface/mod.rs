@@ -1,9 +1,9 @@
 //! Stage 2: coplanar connected triangles of one material become one planar polygon.
 
 //!
-//! In order: a placement's triangles get shared vertices ([`weld`], [`facet`]), coplanar neighbours
-//! are grouped ([`group`]) and outlined ([`outline`], [`boundary`]); then triangles that meet or cut a
-//! surface are found ([`contact`]) and cut it into regions ([`dangling`], [`region`]).
+//! In order: a placement's triangles get shared vertices (`weld`, `facet`), coplanar neighbours are
+//! grouped (`group`) and outlined (`outline`, `boundary`); then triangles that meet or cut a surface
+//! are found (`contact`) and cut it into regions (`dangling`, `region`).
 
 mod boundary;
 mod build;

@@ -49,7 +49,8 @@ pub(super) fn outline(facets: &Facets, members: &[usize]) -> Option<Outline> {
 
     let mut rings = boundary_rings(facets, &members, &frame);
     let enclosed = |rings: &[Vec<DVec3>]| {
-        let project = |r: &Vec<DVec3>| polygon::signed_area(&r.iter().map(|&p| frame.project(p)).collect::<Ring>());
+        let project =
+            |r: &Vec<DVec3>| polygon::signed_area(&r.iter().map(|&p| frame.project(p)).collect::<Ring>());
         rings.iter().map(project).sum::<f64>()
     };
     if (enclosed(&rings) - expected).abs() > AREA_CHANGE * expected {
@@ -79,14 +80,16 @@ fn boundary_rings(facets: &Facets, members: &[&Facet], frame: &Frame) -> Vec<Vec
     let places: Vec<DVec3> = vertices.iter().map(|&v| facets.positions[v as usize]).collect();
     let points: Vec<DVec2> = places.iter().map(|&p| frame.project(p)).collect();
     let rings = trace_rings(&points, open);
-    rings.into_iter().map(|r| r.into_iter().filter_map(|v| places.get(v as usize).copied()).collect()).collect()
+    rings
+        .into_iter()
+        .map(|r| r.into_iter().filter_map(|v| places.get(v as usize).copied()).collect())
+        .collect()
 }
 
 fn without_collinear_corners(ring: &[DVec3], frame: &Frame, noise: f64) -> Vec<DVec3> {
     let flat: Ring = ring.iter().map(|&p| frame.project(p)).collect();
-    let (low, high) = flat
-        .iter()
-        .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+    let (low, high) =
+        flat.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
     let tolerance = noise.max(COLLINEAR * (high - low).length());
     let corners = polygon::simplified_corners_keeping_area(&flat, tolerance, AREA_CHANGE / 4.0);
     corners.into_iter().map(|i| ring[i]).collect()

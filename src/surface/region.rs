@@ -22,7 +22,7 @@ pub(super) struct Cutting<'a> {
 
 /// The parts of a surface.
 pub(super) struct Parts {
-    /// At least one; none where `whole` triangles have to be taken from elsewhere.
+    /// None where the rings overlap.
     pub(super) regions: Vec<Region>,
     /// Contact edges that were left out.
     pub(super) dropped: usize,
@@ -35,8 +35,8 @@ const AREA_CHANGE: f64 = 1e-6;
 const LEAST_SHARE: f64 = 1e-9;
 
 impl Cutting<'_> {
-    /// The regions. Where cutting does not keep the area, the surface stays whole; where not even the
-    /// rings can be triangulated (a surface that overlaps itself), there are none.
+    /// The regions. Where cutting does not keep the area, the surface stays whole; where the rings
+    /// themselves do not (they overlap each other), there are none.
     pub(super) fn cut(&self) -> Parts {
         if self.contacts.is_empty() {
             return Parts { regions: self.whole(), dropped: 0 };
@@ -66,6 +66,14 @@ impl Cutting<'_> {
         arrange(PlaneInput { contacts: &contacts, ..input })
     }
 
+    /// What the rings cover, each place once: rings that no longer overlap, and their area.
+    pub(super) fn union(&self) -> (Vec<Ring>, f64) {
+        let input = PlaneInput { rings: self.rings, contacts: &[], points: &[], snap: self.snap };
+        let regions = self.components(&subdivide(arrange(input)));
+        let area = regions.iter().map(|r| r.area).sum();
+        (regions.into_iter().flat_map(|r| r.rings).collect(), area)
+    }
+
     fn whole(&self) -> Vec<Region> {
         let triangles = match self.rings {
             [ring] if ring.len() == 3 => vec![[ring[0], ring[1], ring[2]]],
@@ -84,7 +92,7 @@ impl Cutting<'_> {
         let mut edges: Vec<Vec<(u32, u32)>> = vec![Vec::new(); count];
         let mut triangles: Vec<Vec<[DVec2; 3]>> = vec![Vec::new(); count];
         for (face, &own) in inside.faces.iter().zip(&component) {
-            triangles[own].push(inside.triangle(face));
+            triangles[own].extend(with_area(inside.triangle(face)));
             for k in 0..3 {
                 if face.neighbours[k].is_none_or(|n| component[n as usize] != own) {
                     edges[own].push((face.corners[k], face.corners[(k + 1) % 3]));
@@ -110,7 +118,7 @@ impl Cutting<'_> {
             rings.push(kept.into_iter().map(|i| all[i]).collect::<Ring>());
         }
         let area = polygon::area(&rings);
-        if !(area > 0.0) {
+        if area <= 0.0 || area.is_nan() {
             return None;
         }
         if removed {
@@ -151,7 +159,8 @@ impl Cutting<'_> {
             let first = borders.partition_point(|b| b.0 < c);
             let around = borders[first..].iter().take_while(|b| b.0 == c).map(|b| root(&owner, b.1));
             let own = root(&owner, c);
-            let largest = around.filter(|&o| o != own).max_by(|&a, &b| area[a].total_cmp(&area[b]).then(b.cmp(&a)));
+            let largest =
+                around.filter(|&o| o != own).max_by(|&a, &b| area[a].total_cmp(&area[b]).then(b.cmp(&a)));
             if let Some(largest) = largest {
                 area[largest] += area[own];
                 owner[own] = largest;
@@ -198,7 +207,15 @@ fn flood(faces: &[Face]) -> (Vec<usize>, usize) {
 
 fn triangles_of(rings: &[Ring], snap: f64) -> Vec<[DVec2; 3]> {
     let inside = subdivide(arrange(PlaneInput { rings, contacts: &[], points: &[], snap }));
-    inside.faces.iter().map(|f| inside.triangle(f)).collect()
+    inside.faces.iter().filter_map(|f| with_area(inside.triangle(f))).collect()
+}
+
+/// Leaves out what rounding makes of collinear vertices: a triangle without height.
+fn with_area(triangle: [DVec2; 3]) -> Option<[DVec2; 3]> {
+    const THINNEST: f64 = 1e-13;
+    let [a, b, c] = triangle;
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    (polygon::orient(a, b, c) > THINNEST * longest).then_some(triangle)
 }
 
 fn area_of(triangles: &[[DVec2; 3]]) -> f64 {
