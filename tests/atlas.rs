@@ -277,7 +277,7 @@ fn buried_regions_give_way_to_open_ones() {
         match site.position {
             SitePosition::Buried => assert!(site.region == 1 && texels_under > 1.4, "{site:?}"),
             SitePosition::Moved => {
-                assert!(site.region == 0 && (0.0..1.6).contains(&texels_under), "{site:?}")
+                assert!(site.region == 0 && (0.0..1.6).contains(&texels_under), "{site:?}"),
             }
             SitePosition::Centre => assert!(site.region == 0 && texels_under < ROUNDING, "{site:?}"),
         }

@@ -79,7 +79,8 @@ pub fn sites(
         .into_par_iter()
         .map(|(index, rows)| band_sites(&prepared[index], index, rows, &|region| open_region(index, region)))
         .collect();
-    let sites = found.concat();
+    let mut sites = Vec::with_capacity(found.iter().map(Vec::len).sum());
+    found.into_iter().for_each(|band| sites.extend(band));
     keep_one_per_texel(sites, atlas)
 }
 
