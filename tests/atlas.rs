@@ -274,13 +274,12 @@ fn buried_regions_give_way_to_open_ones() {
         let centre = DVec2::new(f64::from(site.x), f64::from(site.y)) + 0.5;
         let x = chart.texel_from_plane.inverse().transform_point2(centre).x;
         let texels_under = (x - 2.0) * 10.25;
-        match site.position {
-            SitePosition::Buried => assert!(site.region == 1 && texels_under > 1.4, "{site:?}"),
-            SitePosition::Moved => {
-                assert!(site.region == 0 && (0.0..1.6).contains(&texels_under), "{site:?}"),
-            }
-            SitePosition::Centre => assert!(site.region == 0 && texels_under < ROUNDING, "{site:?}"),
-        }
+        let expected = match site.position {
+            SitePosition::Buried => site.region == 1 && texels_under > 1.4,
+            SitePosition::Moved => site.region == 0 && (0.0..1.6).contains(&texels_under),
+            SitePosition::Centre => site.region == 0 && texels_under < ROUNDING,
+        };
+        assert!(expected, "{site:?}, {texels_under} texels under the cupboard");
         counts[site.position as usize] += 1;
     }
     assert!(counts.iter().all(|&c| c > 20), "all kinds occur: {counts:?}");
