@@ -211,10 +211,10 @@ fn rectangles_fill_the_page() {
 #[cfg(feature = "xatlas")]
 #[test]
 fn angles_nest() {
-    let surfaces: Vec<_> = (0..12).map(|_| angle(1.0, 1.0, 0.2)).collect();
+    let surfaces: Vec<_> = (0..12).map(|_| angle(1.0, 1.2, 0.2)).collect();
     let atlas = unwrap(&surfaces, &at_size(256)).unwrap();
     assert_sound(&surfaces, &atlas);
-    let bounds = 12.0 * atlas.texels_per_metre.powi(2);
+    let bounds = 12.0 * 1.2 * atlas.texels_per_metre.powi(2);
     assert!(bounds > 1.1 * 256.0 * 256.0, "{bounds}");
 }
 
