@@ -67,12 +67,11 @@ impl Canvas {
         let mut bytes = Vec::with_capacity(self.width as usize * self.height as usize * 3);
         for rows in self.samples.chunks_exact(stride * step) {
             for x in (0..stride).step_by(step) {
-                for channel in 0..3 {
-                    let sum: u32 = (0..step * step)
-                        .map(|k| u32::from(rows[(k / step) * stride + x + k % step][channel]))
-                        .sum();
-                    bytes.push(((sum + SAMPLES) / (SAMPLES * SAMPLES)) as u8);
-                }
+                let samples = (0..step * step).filter_map(|k| rows.get((k / step) * stride + x + k % step));
+                let sum = samples.fold([0u32; 3], |sum, sample| {
+                    [0, 1, 2].map(|channel| sum[channel] + u32::from(sample[channel]))
+                });
+                bytes.extend(sum.map(|s| ((s + SAMPLES) / (SAMPLES * SAMPLES)) as u8));
             }
         }
         bytes

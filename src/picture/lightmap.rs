@@ -1,33 +1,47 @@
 //! A lightmap as a picture.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::{PictureError, ToneMap, png};
 use crate::raster::Lightmap;
 
 /// The page as PNG, one pixel a texel, exposed by its bright texels ([`ToneMap::for_values`]).
 ///
-/// Texels that are missing from a page that is not whole are black.
+/// A page that has fewer texels than it says is cut after its last whole row.
 ///
 /// # Errors
 ///
-/// [`PictureError::Encode`], for a page without texels for instance.
+/// [`PictureError::Encode`], for a page without texels.
 pub fn lightmap_png(lightmap: &Lightmap) -> Result<Vec<u8>, PictureError> {
-    let value = |texel: &[f32; 3]| -> DVec3 { Vec3::from_array(*texel).as_dvec3() };
-    let tone = ToneMap::for_values(lightmap.texels.iter().map(value));
-    let size = (lightmap.width, lightmap.height);
-    let pixels = lightmap.width as usize * lightmap.height as usize;
-    let mut bytes: Vec<u8> =
-        lightmap.texels.iter().take(pixels).flat_map(|t| tone.colour(value(t))).collect();
-    if lightmap.texels.len() < pixels {
-        // An empty list of texels and a claimed size must not make us reserve gigabytes.
-        let size = if lightmap.texels.is_empty() {
-            (0, 0)
-        } else {
-            (lightmap.width, bytes.len() as u32 / 3 / lightmap.width.max(1))
-        };
-        bytes.truncate(size.0 as usize * size.1 as usize * 3);
-        return png::encode(&bytes, size);
+    let value = |texel: &[f32; 3]| Vec3::from_array(*texel).as_dvec3();
+    let width = lightmap.width as usize;
+    let rows = (lightmap.texels.len() / width.max(1)).min(lightmap.height as usize);
+    let texels = lightmap.texels.get(..width * rows).unwrap_or_default();
+    let tone = ToneMap::for_values(texels.iter().map(value));
+    let pixels: Vec<u8> = texels.iter().flat_map(|t| tone.colour(value(t))).collect();
+    png::encode(&pixels, (lightmap.width, rows as u32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_keeps_its_size_and_its_top() {
+        let mut texels = vec![[0.0; 3]; 6];
+        texels[1] = [5.0; 3];
+        let bytes = lightmap_png(&Lightmap { width: 3, height: 2, texels }).unwrap();
+        let picture = image::load_from_memory(&bytes).unwrap().into_rgb8();
+        assert_eq!(picture.dimensions(), (3, 2));
+        assert!(picture.get_pixel(1, 0).0[0] > 150);
+        assert_eq!(picture.get_pixel(1, 1).0, [0; 3]);
     }
-    png::encode(&bytes, size)
+
+    #[test]
+    fn a_page_that_is_not_whole_does_no_harm() {
+        let texels = vec![[1.0; 3]; 7];
+        let cut = lightmap_png(&Lightmap { width: 3, height: u32::MAX, texels }).unwrap();
+        assert_eq!(image::load_from_memory(&cut).unwrap().into_rgb8().dimensions(), (3, 2));
+        assert!(lightmap_png(&Lightmap { width: 0, height: 0, texels: Vec::new() }).is_err());
+    }
 }

@@ -79,7 +79,8 @@ pub fn sites(
         .into_par_iter()
         .map(|(index, rows)| band_sites(&prepared[index], index, rows, &|region| open_region(index, region)))
         .collect();
-    let sites = found.concat();
+    let mut sites = Vec::with_capacity(found.iter().map(Vec::len).sum());
+    found.into_iter().for_each(|band| sites.extend(band));
     keep_one_per_texel(sites, atlas)
 }
 
@@ -136,7 +137,9 @@ fn prepare(surface: &Surface, chart: &Chart, size: (u32, u32)) -> TexelChart {
     let (low, high) = ((low - 1.5).floor(), (high + 1.5).ceil());
     let min = ((low.x as i64).max(0), (low.y as i64).max(0));
     let max = ((high.x as i64).min(i64::from(size.0)), (high.y as i64).min(i64::from(size.1)));
-    TexelChart { triangles, window: Window { min, max }, plane_from_texel: chart.texel_from_plane.inverse() }
+    let is_empty = min.0 >= max.0 || min.1 >= max.1;
+    let window = if is_empty { Window { min: (0, 0), max: (0, 0) } } else { Window { min, max } };
+    TexelChart { triangles, window, plane_from_texel: chart.texel_from_plane.inverse() }
 }
 
 /// Which edges belong to one triangle only; a T-junction's edges count as such, which is harmless.
@@ -153,7 +156,7 @@ fn boundary_edges(triangles: &[[DVec2; 3]]) -> Vec<[bool; 3]> {
 fn bands(window: &Window) -> impl Iterator<Item = Range<i64>> + use<> {
     let Window { min, max } = *window;
     let rows = (TEXELS_PER_TASK / (max.0 - min.0).max(1)).max(1);
-    let count = if min.0 < max.0 { (max.1 - min.1).max(0) } else { 0 };
+    let count = max.1 - min.1;
     (0..(count + rows - 1) / rows).map(move |k| {
         let first = min.1 + k * rows;
         first..(first + rows).min(max.1)

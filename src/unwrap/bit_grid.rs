@@ -73,8 +73,9 @@ mod tests {
             (0..200).filter(|x| page.words[page.stride + x / 64] >> (x % 64) & 1 == 1).collect();
         assert_eq!(set, (67..197).collect::<Vec<_>>());
         assert_eq!(page.words[2 * page.stride..], [0, 0, 1 << 3, 0], "67 + 64 is bit 3 of word 2");
-        assert!(!page.stamp(&part, 0, 1), "bits 67 to 129 are taken");
-        assert!(page.stamp(&part, 0, 0) || page.words[0] != 0, "row 0 was free, row 1's bit 64 as well");
+        assert!(page.clone().stamp(&part, 0, 0), "only bit 64 comes to row 1, and that is clear");
+        assert!(!page.clone().stamp(&part, 3, 0), "bit 67 of row 1 is taken");
+        assert!(!page.clone().stamp(&part, 0, 2), "the second row falls off the page");
     }
 
     #[test]

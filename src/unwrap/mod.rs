@@ -83,12 +83,10 @@ pub struct UnwrapOptions {
 /// [`UnwrapError::TooLarge`] if the density asked for needs a page above 16384 texels.
 pub fn unwrap(surfaces: &[Surface], options: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
     let shapes: Vec<_> = surfaces.iter().map(shape::Shape::of).collect();
-    let paddings = options.padding.map_or([1, 0], |p| [p, p]);
-    let first = density::lay_out(&shapes, options.resolution, paddings[0]);
-    if first.is_err() && paddings[1] != paddings[0] {
-        if let Ok(atlas) = density::lay_out(&shapes, options.resolution, paddings[1]) {
-            return Ok(atlas);
-        }
+    let padding = options.padding.unwrap_or(1);
+    let atlas = density::lay_out(&shapes, options.resolution, padding);
+    match (&atlas, options.padding) {
+        (Err(_), None) => density::lay_out(&shapes, options.resolution, 0).or(atlas),
+        _ => atlas,
     }
-    first
 }

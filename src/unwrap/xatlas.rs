@@ -4,7 +4,11 @@
 //! UV mesh is split into charts by material and shared corners, and a mesh per chart would be
 //! compared with all meshes before it. A chart's extents are whole texels already, so that
 //! xatlas's own stretch to whole texels is the identity, and what it does to a chart is a shift by
-//! whole texels, after a swap of the axes or not. That is read off the corners and checked.
+//! whole texels, after a swap of the axes or not.
+//!
+//! That is read off the image in which xatlas notes every texel's chart. Its output vertices would
+//! say the same, but xatlas leaves the type of a UV mesh's charts uninitialized, and `xatlas_rs`
+//! panics on types that it does not know before it hands the vertices out.
 //!
 //! A rectangle goes in as two triangles. Other surfaces go in as their triangles, so that they can
 //! nest, but only where these hold together by shared corners and none is a sliver (xatlas ignores
@@ -13,8 +17,9 @@
 use std::collections::BTreeMap;
 
 use glam::DVec2;
-use xatlas_rs::{ChartOptions, IndexData, MeshData, PackOptions, UvMeshDecl, Vertex};
+use xatlas_rs::{ChartOptions, IndexData, MeshData, PackOptions, UvMeshDecl};
 
+use super::footprint::{Span, spans};
 use super::pack::{Packer, Page, Place, SizedShape, Turn};
 use super::shape::Shape;
 use crate::geom::polygon::orient;
@@ -25,8 +30,12 @@ const RECTANGLE_SHARE: f64 = 0.9;
 /// Triangles below twice this area are slivers, texels²; xatlas ignores them from 1.2e-7 downward.
 const SLIVER: f64 = 1e-4;
 
-/// Corners are known to xatlas as f32 within a page of up to 2^14 texels: half a unit is 2^-11.
-const TOLERANCE: f64 = 4e-3;
+/// A texel of xatlas's image: the chart's index,
+const CHART_MASK: u32 = 0x1fff_ffff;
+/// and what it is to the chart; only this bit set where the chart's triangles meet the texel's square,
+const IS_CHART: u32 = 0x8000_0000;
+/// others where it is there for bilinear lookups or for padding.
+const KIND_MASK: u32 = 0xe000_0000;
 
 /// What one pack may cost, charts × texels: xatlas tries every position for every chart, about
 /// 0.3 s for this many.
@@ -55,8 +64,6 @@ impl Nesting {
 struct Input {
     /// `(x, y)` pairs of f32 in texels, native byte order.
     bytes: Vec<u8>,
-    /// Where each chart's corners begin, and the end.
-    starts: Vec<usize>,
     indices: Vec<u32>,
     materials: Vec<u32>,
 }
@@ -90,7 +97,7 @@ impl Packer for Nesting {
             bilinear: true,
             block_align: false,
             brute_force: true,
-            create_image: false,
+            create_image: true,
             rotate_charts_to_axis: false,
             rotate_charts: true,
             max_chart_size: 0,
@@ -98,50 +105,97 @@ impl Packer for Nesting {
         if xatlas.atlas_count() != 1 || xatlas.chart_count() as usize != charts.len() {
             return None;
         }
-        let meshes = xatlas.meshes();
-        let vertices = &meshes.first()?.vertex_array;
-        outlines
-            .iter()
-            .zip(input.starts.windows(2))
-            .map(|(outline, range)| place(&outline.corners, vertices.get(range[0]..range[1])?))
+        let image = Image { texels: xatlas.image()?, width: xatlas.width() as usize };
+        let corners = image.corners(charts.len());
+        let placed = outlines.iter().zip(charts).zip(corners).enumerate();
+        placed
+            .map(|(index, ((outline, chart), corner))| image.place((index, chart), outline, corner?))
             .collect()
+    }
+}
+
+/// Which texel belongs to which chart, by xatlas.
+struct Image<'a> {
+    texels: &'a [u32],
+    width: usize,
+}
+
+impl Image<'_> {
+    /// Each chart's least column and row.
+    fn corners(&self, charts: usize) -> Vec<Option<(u32, u32)>> {
+        let mut corners = vec![None; charts];
+        for (y, row) in (0u32..).zip(self.texels.chunks_exact(self.width.max(1))) {
+            for (x, &texel) in (0u32..).zip(row) {
+                if texel & KIND_MASK != IS_CHART {
+                    continue;
+                }
+                if let Some(corner) = corners.get_mut((texel & CHART_MASK) as usize) {
+                    let (least_x, least_y) = corner.unwrap_or((x, y));
+                    *corner = Some((least_x.min(x), least_y.min(y)));
+                }
+            }
+        }
+        corners
+    }
+
+    /// The place, at `corner`, of which the image shows more texels. The caller checks it.
+    fn place(
+        &self,
+        (index, chart): (usize, &SizedShape<'_>),
+        outline: &Outline,
+        corner: (u32, u32),
+    ) -> Option<Place> {
+        let at = |turn| Place { x: corner.0, y: corner.1, turn };
+        let shown = |turn| {
+            let triangles = outline.placed(at(turn));
+            let spans = triangles.flat_map(|t| spans(t, 0.5, (0, i64::from(super::density::LARGEST_SIDE))));
+            spans.map(|span| self.count(index, &span)).sum::<usize>()
+        };
+        let (upright, swapped) = (shown(Turn::Upright), shown(Turn::Swapped));
+        let fits = upright.max(swapped) > chart.width.min(chart.height) as usize;
+        fits.then(|| at(if upright >= swapped { Turn::Upright } else { Turn::Swapped }))
+    }
+
+    /// How many texels of the span the chart's triangles meet.
+    fn count(&self, index: usize, span: &Span) -> usize {
+        let row = span.y as usize * self.width;
+        let columns =
+            row + span.first.max(0) as usize..row + (span.last + 1).clamp(0, self.width as i64) as usize;
+        let texels = self.texels.get(columns).unwrap_or_default();
+        texels.iter().filter(|&&t| t & KIND_MASK == IS_CHART && (t & CHART_MASK) as usize == index).count()
+    }
+}
+
+impl Outline {
+    /// The triangles in the page.
+    fn placed(&self, place: Place) -> impl Iterator<Item = [DVec2; 3]> + '_ {
+        let shift = DVec2::new(f64::from(place.x), f64::from(place.y)) + 0.5;
+        self.triangles.iter().map(move |t| {
+            t.map(|k| {
+                let p = self.corners.get(k as usize).copied().unwrap_or_default();
+                shift + if place.turn == Turn::Swapped { DVec2::new(p.y, p.x) } else { p }
+            })
+        })
     }
 }
 
 impl Input {
     fn of(outlines: &[Outline]) -> Self {
-        let mut input = Self { starts: vec![0], ..Self::default() };
+        let mut input = Self::default();
+        let mut start = 0;
         for (material, outline) in outlines.iter().enumerate() {
-            let start = input.starts.last().copied().unwrap_or(0);
             for corner in &outline.corners {
                 input.bytes.extend((corner.x as f32).to_ne_bytes());
                 input.bytes.extend((corner.y as f32).to_ne_bytes());
             }
             for triangle in &outline.triangles {
-                input.indices.extend(triangle.map(|k| k + start as u32));
+                input.indices.extend(triangle.map(|k| k + start));
                 input.materials.push(material as u32);
             }
-            input.starts.push(start + outline.corners.len());
+            start += outline.corners.len() as u32;
         }
         input
     }
-}
-
-/// What xatlas did to a chart: finds the shift and the turn, and checks every corner.
-fn place(corners: &[DVec2], vertices: &[Vertex]) -> Option<Place> {
-    let packed: Vec<DVec2> =
-        vertices.iter().map(|v| DVec2::new(f64::from(v.uv[0]), f64::from(v.uv[1]))).collect();
-    [Turn::Upright, Turn::Swapped].into_iter().find_map(|turn| {
-        let turned = |p: DVec2| if turn == Turn::Swapped { DVec2::new(p.y, p.x) } else { p };
-        let shift = (*packed.first()? - turned(*corners.first()?) - 0.5).round();
-        let matches = packed.len() == corners.len()
-            && shift.cmpge(DVec2::ZERO).all()
-            && corners
-                .iter()
-                .zip(&packed)
-                .all(|(&p, &q)| (turned(p) + shift + 0.5 - q).abs().max_element() < TOLERANCE);
-        matches.then_some(Place { x: shift.x as u32, y: shift.y as u32, turn })
-    })
 }
 
 /// The triangles by which a chart goes in: they cover it, hold together, and reach its extents.
