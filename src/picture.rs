@@ -2,8 +2,8 @@
 //!
 //! For eyes only; nothing reads them back. Luminance `Y` is shown as `Y / (Y + m)` (Reinhard et al.,
 //! "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002, without the white point), where
-//! `m` is the median of the texels that hold light: half of them end up darker than middle grey, and
-//! no highlight burns out. Texels that are not finite numbers are magenta.
+//! `m` is the median of the texels that hold light: half of them get less than half of the display's
+//! light, and no highlight burns out. Texels that are not finite numbers are magenta.
 
 use std::io::Cursor;
 
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn brighter_light_looks_brighter_and_nothing_burns_out() {
-        let texels = [0.0, 0.01, 1.0, 100.0, 10_000.0].map(|y| [y; 3]).to_vec();
+        let texels = [0.0, 0.1, 1.0, 10.0, 100.0].map(|y| [y; 3]).to_vec();
         let image = of_lightmap(&page(5, 1, texels));
         let greys: Vec<u8> = image.pixels().map(|p| p.0[0]).collect();
         assert!(greys.is_sorted() && greys.windows(2).all(|w| w[0] < w[1]), "{greys:?}");
@@ -212,7 +212,7 @@ mod tests {
         assert_eq!(image.dimensions(), (64, 64));
         assert_ne!(image.get_pixel(20, 0).0, [0; 3], "upper edge");
         assert_ne!(image.get_pixel(0, 20).0, [0; 3], "left edge");
-        assert_ne!(image.get_pixel(32, 31).0, image.get_pixel(50, 50).0, "hypotenuse");
+        assert_ne!(image.get_pixel(32, 32).0, [0; 3], "hypotenuse");
         assert_eq!(image.get_pixel(50, 50).0, [0; 3], "outside");
     }
 
