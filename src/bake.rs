@@ -76,7 +76,11 @@ pub fn bake(path: &Path, options: &BakeOptions, progress: &mut dyn Progress) -> 
 ///
 /// # Errors
 /// As [`bake`]. Runs in the caller's rayon thread pool; `options.threads` has no effect.
-pub fn bake_scene(scene: &Scene, options: &BakeOptions, progress: &mut dyn Progress) -> Result<BakeResult, Error> {
+pub fn bake_scene(
+    scene: &Scene,
+    options: &BakeOptions,
+    progress: &mut dyn Progress,
+) -> Result<BakeResult, Error> {
     options.validate()?;
     run(scene, options, Recorder::new(progress))
 }
@@ -91,11 +95,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     let surfaces = set.surfaces;
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
     let scale = Scale::of(&surfaces, options);
-    let mesh_options = MeshOptions {
-        patch_size: scale.patch_size,
-        nudge: NUDGE * tracer.diagonal(),
-        lift: tracer.margin(),
-    };
+    let mesh_options =
+        MeshOptions { patch_size: scale.patch_size, nudge: NUDGE * tracer.diagonal(), lift: tracer.margin() };
     let facets = build(&surfaces, &appearance, mesh_options);
     let initial = account::leaf_count(&facets);
 

@@ -19,3 +19,8 @@ pub mod trace;
 pub mod unwrap;
 
 pub use bake::{BakeResult, bake, bake_scene};
+
+/// Holds the README's Rust to what the library offers.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

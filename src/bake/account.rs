@@ -56,7 +56,9 @@ fn listed(names: &[&str]) -> String {
 /// Says that vertices or edges were lost.
 pub(super) fn warn_of_dropped(dropped: usize, progress: &mut dyn Progress) {
     if dropped > 0 {
-        progress.warn(&format!("{dropped} points or edges of the mesh could not be triangulated and were left out"));
+        progress.warn(&format!(
+            "{dropped} points or edges of the mesh could not be triangulated and were left out"
+        ));
     }
 }
 
@@ -69,10 +71,9 @@ pub(super) fn fill_report(report: &mut Report, scene: &Scene, surfaces: &[Surfac
     report.scene.triangles = scene.triangles.len() as u64;
     report.scene.surfaces = surfaces.len() as u64;
     report.scene.lights = scene.lights.len() as u64;
-    report.scene.emitters = surfaces
-        .iter()
-        .filter(|s| scene.materials[s.material].emission.cmpgt(DVec3::ZERO).any())
-        .count() as u64;
+    report.scene.emitters =
+        surfaces.iter().filter(|s| scene.materials[s.material].emission.cmpgt(DVec3::ZERO).any()).count()
+            as u64;
     report.elements.at_end = leaf_count(&solution.facets);
     report.elements.splits.cob = solution.direct.cob_splits;
     report.elements.splits.gradient = solution.direct.gradient_splits + solution.delivery.splits;

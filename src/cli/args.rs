@@ -20,7 +20,7 @@ COBAKE_LOG=error|warn|info|debug|trace writes the stages' log to stderr.";
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Bake a scene's lightmap into a new GLB file
+    /// Bake a scene's lightmap into a new file
     Bake(Box<BakeArgs>),
 }
 
@@ -31,7 +31,7 @@ pub(crate) struct BakeArgs {
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
 
-    /// Where the lightmapped scene goes, as GLB; its folder must exist
+    /// Where the lightmapped scene goes; its folder must exist
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 

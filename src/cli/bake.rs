@@ -45,7 +45,7 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
 fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
     let mut clock = StageClock::start();
     clock.begin(Stage::Export);
-    write_whole(files.output, &result.glb)?;
+    cobake::export::write(files.output, &result.glb).map_err(Error::from)?;
     result.report.time.add(Stage::Export, clock.finish().total);
     result.report.peak_memory_bytes = peak_memory_bytes();
 

@@ -28,8 +28,11 @@ pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {
     }
 }
 
-/// The error and its causes, one a line, without a final line break.
+/// The error and its causes, one a line, without a final line break. Being cancelled is no error.
 pub(crate) fn chain(error: &anyhow::Error) -> String {
+    if exit_code(error) == CANCELLED {
+        return Error::Cancelled.to_string();
+    }
     let mut text = format!("error: {error}");
     for cause in error.chain().skip(1) {
         // Writing into a string cannot fail.
@@ -63,6 +66,12 @@ mod tests {
     fn context_keeps_the_code() {
         let error = Err::<(), _>(wrong_option()).context("cannot bake scene.glb").expect_err("an error");
         assert_eq!(exit_code(&error), 2);
+    }
+
+    #[test]
+    fn being_cancelled_is_no_error() {
+        let error = anyhow::Error::from(Error::Cancelled).context("cannot bake scene.glb");
+        assert_eq!(chain(&error), "cancelled; nothing was written");
     }
 
     #[test]

@@ -26,14 +26,9 @@ pub(crate) struct Files<'a> {
 impl Files<'_> {
     /// Finds out before the work what would fail after it.
     ///
-    /// Wrong use: a result would replace the input or another result, or the output's name promises a
-    /// text file. Failures: the input cannot be read, a result's folder is missing or cannot be written to.
+    /// Wrong use: a result would replace the input or another result. Failures: the input cannot be
+    /// read, a result's folder is missing or cannot be written to.
     pub(crate) fn check(&self) -> anyhow::Result<()> {
-        if self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf")) {
-            let name = self.output.with_extension("glb");
-            let message = format!("the output is a GLB file; name it {}", name.display());
-            return Err(WrongUse(message).into());
-        }
         self.check_distinct()?;
         check_input(self.input)?;
         check_target(self.output)?;
@@ -98,12 +93,14 @@ fn check_picture_folder(folder: &Path) -> anyhow::Result<()> {
 }
 
 /// Writes `bytes` to a temporary name beside `path` and renames it, so that no half file is ever seen.
+/// A symbolic link is followed.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let write = || -> anyhow::Result<()> {
-        let mut file = temporary_beside(path)?;
+        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let mut file = temporary_beside(&target)?;
         file.write_all(bytes)?;
         file.as_file().sync_all()?;
-        file.persist(path).map_err(|failed| failed.error)?;
+        file.persist(&target).map_err(|failed| failed.error)?;
         Ok(())
     };
     write().with_context(|| format!("cannot write {}", path.display()))

@@ -67,8 +67,8 @@ impl Drop for TerminalProgress {
 
 impl Progress for TerminalProgress {
     fn begin(&mut self, stage: Stage) {
-        self.bar.reset();
         self.bar.set_prefix(stage.name());
+        self.bar.reset();
         if !self.bar.is_hidden() {
             self.bar.enable_steady_tick(Duration::from_millis(200));
         }

@@ -2,7 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Cell, Colour, EMPTY, MeshDrawing, NOT_EMPTY, PictureError, ToneMap, UNINITIALIZED, lightmap_png};
+use super::{
+    Cell, Colour, EMPTY, MeshDrawing, NOT_EMPTY, PictureError, ToneMap, UNINITIALIZED, lightmap_png,
+};
 use crate::cob::CobState;
 use crate::element::{Facet, Side};
 use crate::raster::Lightmap;
