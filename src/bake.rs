@@ -109,6 +109,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         options,
         patch_size: scale.patch_size,
         threshold: scale.threshold,
+        indirect_threshold: scale.indirect_threshold,
     };
     let solution = solve(&problem, facets, &mut |done| {
         recorder.advance(done);
@@ -178,6 +179,7 @@ fn tracer(scene: &Scene) -> Tracer {
 struct Scale {
     patch_size: f64,
     threshold: f64,
+    indirect_threshold: f64,
 }
 
 impl Scale {
@@ -192,6 +194,7 @@ impl Scale {
             Direct::Mesh => texel,
             Direct::Texel => TEXELS_AN_ELEMENT * texel,
         });
-        Self { patch_size: patch_size.max(threshold), threshold }
+        let indirect_threshold = options.subdivision_threshold.unwrap_or(texel);
+        Self { patch_size: patch_size.max(threshold), threshold, indirect_threshold }
     }
 }

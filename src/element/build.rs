@@ -56,6 +56,8 @@ pub fn build(surfaces: &[Surface], appearance: &dyn SurfaceAppearance, options: 
                     if surface.double_sided { &[Side::Front, Side::Back] } else { &[Side::Front] };
                 for &side in sides {
                     let (frame, rings) = seen_from(side, surface.frame, &rings);
+                    let triangles: Vec<Ring> = region.triangles.iter().map(|t| t.to_vec()).collect();
+                    let (_, parts) = seen_from(side, surface.frame, &clip_rings(&triangles, min, max));
                     let exitance = appearance.exitance(index, min, max);
                     let mut facet = Facet {
                         surface: index,
@@ -63,6 +65,7 @@ pub fn build(surfaces: &[Surface], appearance: &dyn SurfaceAppearance, options: 
                         side,
                         frame,
                         rings,
+                        parts,
                         exitance,
                         elements: Vec::new(),
                         samples: Vec::new(),
@@ -135,8 +138,8 @@ impl Facet {
             .iter()
             .flatten()
             .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
-        let rings = self.rings.clone();
-        self.add_element(NONE, (min, max), [0, 0, FINEST, FINEST], &rings, appearance);
+        let (rings, parts) = (self.rings.clone(), self.parts.clone());
+        self.add_element(NONE, (min, max), [0, 0, FINEST, FINEST], (&rings, &parts), appearance);
     }
 
     fn split_to(&mut self, patch_size: f64, appearance: &dyn SurfaceAppearance) {
@@ -166,7 +169,10 @@ impl Facet {
         }
         let (min, max) = (e.min, e.max);
         let full = [vec![min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)]];
-        let rings = e.cut.as_ref().map_or_else(|| full.to_vec(), |c| c.rings.clone());
+        let (rings, parts) = match &e.cut {
+            Some(cut) => (cut.rings.clone(), cut.parts.clone()),
+            None => (full.to_vec(), full.to_vec()),
+        };
         let mut children = [NONE; 4];
         let mut count = 0;
         for row in 0..rows {
@@ -182,7 +188,7 @@ impl Facet {
                 };
                 let corner = |i, j| DVec2::new(at(i, columns, min.x, max.x), at(j, rows, min.y, max.y));
                 let rectangle = (corner(column, row), corner(column + 1, row + 1));
-                if let Some(child) = self.add_element(element, rectangle, cell, &rings, appearance) {
+                if let Some(child) = self.add_element(element, rectangle, cell, (&rings, &parts), appearance) {
                     children[count] = child;
                     count += 1;
                 }
@@ -197,7 +203,7 @@ impl Facet {
         parent: u32,
         (min, max): (DVec2, DVec2),
         cell: [u32; 4],
-        rings: &[Ring],
+        (rings, parts): (&[Ring], &[Ring]),
         appearance: &dyn SurfaceAppearance,
     ) -> Option<u32> {
         let rings = clip_rings(rings, min, max);
@@ -222,6 +228,7 @@ impl Facet {
             Box::new(Cut {
                 hull: convex_hull(rings.iter().flatten().copied().collect()),
                 corners_from_samples: plane_fit(positions, min, max),
+                parts: clip_rings(parts, min, max),
                 rings,
             })
         });

@@ -41,6 +41,8 @@ pub struct Facet {
     pub frame: Frame,
     /// The outline inside this tile.
     pub rings: Vec<Ring>,
+    /// The same area as convex polygons.
+    pub parts: Vec<Ring>,
     /// Emitted exitance `π L`.
     pub exitance: DVec3,
     /// The tree; element 0 is the whole facet, children come after their parents.
@@ -75,6 +77,17 @@ impl Facet {
             _ => [e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)]
                 .map(|p| self.frame.lift(p))
                 .to_vec(),
+        }
+    }
+
+    /// The element's area as convex polygons in world space, counter-clockwise seen from the receiving side.
+    #[must_use]
+    pub fn parts(&self, element: u32) -> Vec<Vec<DVec3>> {
+        match &self.elements[element as usize].cut {
+            Some(cut) => {
+                cut.parts.iter().map(|p| p.iter().map(|&q| self.frame.lift(q)).collect()).collect()
+            }
+            None => vec![self.hull(element)],
         }
     }
 

@@ -65,7 +65,9 @@ pub struct Element {
 pub struct Cut {
     /// The rings inside the rectangle.
     pub rings: Vec<Ring>,
-    /// Their convex hull.
+    /// The same area as convex polygons.
+    pub parts: Vec<Ring>,
+    /// The convex hull of all.
     pub hull: Vec<DVec2>,
     /// Takes values in the samples to values in the rectangle's corners: a plane fitted through them.
     corners_from_samples: [[f64; 4]; 4],

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::direct::DirectPass;
 use super::emitter::{Between, Effort, Evaluation, Precision};
-use super::form_factor::{point_to_disk, point_to_polygon};
+use super::form_factor::point_to_disk;
 use super::patches::Patches;
 use super::shooters::{Shooter, Shooters};
 use crate::element::{Element, Facet, NONE, Side};
@@ -167,7 +167,7 @@ impl Delivery<'_> {
         let factor = if s.area < 0.02 * gap * gap {
             point_to_disk(centre, s.centre, s.normal, s.area)
         } else {
-            point_to_polygon(centre, &s.hull)
+            emitter.form_factor(centre)
         };
         let light = luminance(s.radiosity) * factor.max(s.area / (std::f64::consts::PI * gap * gap) * 0.1);
         if s.spread * factor.max(0.05 * near) > TOLERANCE * self.reference && !s.is_leaf() {
@@ -202,7 +202,7 @@ impl Delivery<'_> {
         }
         let may = match self.pass.options.refine {
             Refine::None | Refine::Uniform | Refine::Cob => false,
-            Refine::Gradient | Refine::CobGradient => e.size() > 2.0 * self.pass.threshold,
+            Refine::Gradient | Refine::CobGradient => e.size() > self.pass.indirect_threshold,
         };
         if may && self.facet.split(element, self.pass.appearance) {
             self.values.resize(self.facet.samples.len(), (NONE, DVec3::ZERO));

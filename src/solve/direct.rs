@@ -41,8 +41,10 @@ pub struct DirectPass<'a> {
     pub appearance: &'a (dyn SurfaceAppearance + Sync),
     /// The caller's options.
     pub options: &'a BakeOptions,
-    /// Elements no larger than this are not split, metres.
+    /// Elements no larger than this are not split for direct light, metres.
     pub threshold: f64,
+    /// The same for reflected light.
+    pub indirect_threshold: f64,
     /// Mean irradiance that the emitters would give if they shone evenly: what counts as dim.
     pub typical: f64,
 }

@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use super::form_factor::{SurfacePoint, signed_point_to_polygon};
 use super::visible::{ConvexParts, Workspace, visible_form_factor};
-use crate::geom::hull::{convex_hull, is_convex};
-use crate::geom::{Frame, Ring};
+use crate::geom::Frame;
+use crate::geom::hull::convex_hull;
 use crate::scene::{PunctualKind, PunctualLight};
 use crate::trace::Tracer;
 use crate::trace::shaft::Shaft;
@@ -99,18 +99,13 @@ impl Evaluation {
 }
 
 impl AreaEmitter {
-    /// A polygon in `frame`, whose normal is the emitting side, with exitance `π L`.
+    /// A polygon of `area` in `frame`, whose normal is the emitting side, with exitance `π L`.
     ///
-    /// `triangles` are the same polygon as `rings`, counter-clockwise in the frame.
+    /// `parts` are the polygon as convex ones in world space, counter-clockwise seen from the emitting side.
     #[must_use]
-    pub fn new(frame: Frame, rings: &[Ring], triangles: &[[DVec2; 3]], exitance: DVec3) -> Self {
-        let lift = |ring: &[DVec2]| ring.iter().map(|&p| frame.lift(p)).collect::<Vec<_>>();
-        let parts = match rings {
-            [ring] if ring.len() <= 8 && is_convex(ring) => vec![lift(ring)],
-            _ => triangles.iter().map(|t| lift(t)).collect(),
-        };
-        let hull = lift(&convex_hull(rings.iter().flatten().copied().collect()));
-        let area = crate::geom::polygon::area(rings);
+    pub fn new(frame: Frame, parts: Vec<Vec<DVec3>>, area: f64, exitance: DVec3) -> Self {
+        let corners = parts.iter().flatten().map(|&p| frame.project(p)).collect();
+        let hull = convex_hull(corners).into_iter().map(|p| frame.lift(p)).collect();
         Self { parts, hull, frame, exitance, area }
     }
 
@@ -120,7 +115,9 @@ impl AreaEmitter {
         self.exitance * self.area
     }
 
-    fn unoccluded(&self, receiver: SurfacePoint) -> f64 {
+    /// The form factor from `receiver` with nothing between, in `[0, 1]`.
+    #[must_use]
+    pub fn unoccluded(&self, receiver: SurfacePoint) -> f64 {
         if self.frame.height(receiver.position) <= 0.0 {
             return 0.0;
         }
@@ -228,6 +225,15 @@ impl Emitter {
                     }
                 }
             }
+        }
+    }
+
+    /// The form factor from `receiver` with nothing between; 0 for punctual lights, which have no extent.
+    #[must_use]
+    pub fn form_factor(&self, receiver: SurfacePoint) -> f64 {
+        match self {
+            Self::Area(area) => area.unoccluded(receiver),
+            Self::Punctual(_) => 0.0,
         }
     }
 

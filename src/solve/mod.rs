@@ -17,7 +17,7 @@ pub mod visible;
 
 use glam::DVec3;
 
-use crate::element::{Facet, Side, SurfaceAppearance};
+use crate::element::{Facet, SurfaceAppearance};
 use crate::light::luminance;
 use crate::options::BakeOptions;
 use crate::scene::PunctualLight;
@@ -43,8 +43,10 @@ pub struct Problem<'a> {
     pub options: &'a BakeOptions,
     /// Longest side of a patch, metres.
     pub patch_size: f64,
-    /// Elements no larger than this are not split, metres.
+    /// Elements no larger than this are not split for direct light, metres.
     pub threshold: f64,
+    /// The same for reflected light.
+    pub indirect_threshold: f64,
 }
 
 /// Light in balance.
@@ -84,6 +86,7 @@ pub fn solve(
         appearance: problem.appearance,
         options: problem.options,
         threshold: problem.threshold,
+        indirect_threshold: problem.indirect_threshold,
         typical: typical_irradiance(&glowing, &lights, &facets, tracer.diagonal()),
     };
     let mut direct = ShotCounts::default();
@@ -130,21 +133,8 @@ pub fn solve(
 fn emitters(problem: &Problem, facets: &[Facet]) -> (Vec<Emitter>, Vec<Emitter>) {
     let mut glowing = Vec::new();
     for facet in facets.iter().filter(|f| f.exitance.max_element() > 0.0) {
-        let region = &problem.surfaces[facet.surface].regions[facet.region];
-        let triangles: Vec<_> = match facet.side {
-            Side::Front => region.triangles.clone(),
-            Side::Back => region
-                .triangles
-                .iter()
-                .map(|t| [t[0], t[2], t[1]].map(|p| facet.from_surface_plane(p)))
-                .collect(),
-        };
-        glowing.push(Emitter::Area(AreaEmitter::new(
-            facet.frame,
-            &facet.rings,
-            &clipped_triangles(&triangles, facet),
-            facet.exitance,
-        )));
+        let area = facet.elements[0].area;
+        glowing.push(Emitter::Area(AreaEmitter::new(facet.frame, facet.parts(0), area, facet.exitance)));
     }
     let mut lights: Vec<Emitter> = problem.lights.iter().map(|&l| Emitter::Punctual(l)).collect();
     let diagonal = problem.tracer.diagonal();
@@ -153,18 +143,6 @@ fn emitters(problem: &Problem, facets: &[Facet]) -> (Vec<Emitter>, Vec<Emitter>)
         list.sort_by(|a, b| power(b).total_cmp(&power(a)));
     }
     (glowing, lights)
-}
-
-/// The region's triangles inside the facet's tile, as fans.
-fn clipped_triangles(triangles: &[[glam::DVec2; 3]], facet: &Facet) -> Vec<[glam::DVec2; 3]> {
-    let root = &facet.elements[0];
-    triangles
-        .iter()
-        .flat_map(|t| {
-            let ring = crate::geom::polygon::clip_rectangle(t, root.min, root.max);
-            (1..ring.len().saturating_sub(1)).map(|i| [ring[0], ring[i], ring[i + 1]]).collect::<Vec<_>>()
-        })
-        .collect()
 }
 
 /// The mean irradiance if all power fell evenly onto all facets.

@@ -14,7 +14,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::form_factor::{SurfacePoint, point_to_disk, point_to_polygon};
+use super::emitter::AreaEmitter;
+use super::form_factor::{SurfacePoint, point_to_disk};
 use crate::element::{Element, Facet};
 use crate::trace::Tracer;
 
@@ -37,8 +38,8 @@ pub struct Patch {
     pub facet: u32,
     /// Index of its element there.
     pub element: u32,
-    /// Outline's convex hull, counter-clockwise seen from its side.
-    pub hull: Vec<DVec3>,
+    /// Its shape.
+    shape: AreaEmitter,
     /// Its centre, lifted off the surface.
     pub centre: SurfacePoint,
     /// Four points that stand for its area, lifted.
@@ -260,15 +261,15 @@ impl AtomicCount {
 impl Patch {
     fn new(facet_index: u32, facet: &Facet, element: u32) -> Self {
         let e: &Element = &facet.elements[element as usize];
-        let hull = facet.hull(element);
+        let parts = facet.parts(element);
         let centre = facet.centre(element);
         // Gauss's points of a rectangle: 1/√3 of the way to its corners.
         let points = e.samples.map(|s| centre.position.lerp(facet.samples[s as usize].point.position, 0.577));
-        let radius = hull.iter().map(|p| p.distance(centre.position)).fold(0.0, f64::max);
+        let radius = parts.iter().flatten().map(|p| p.distance(centre.position)).fold(0.0, f64::max);
         Self {
             facet: facet_index,
             element,
-            hull,
+            shape: AreaEmitter::new(facet.frame, parts, e.area, DVec3::ONE),
             centre,
             points,
             radius,
@@ -318,7 +319,7 @@ fn exchange(a: &Patch, b: &Patch, tracer: &Tracer) -> (f64, u64) {
         let f = if shooter.area < 0.01 * distance * distance {
             point_to_disk(receiver.centre, shooter.centre.position, shooter.centre.normal, shooter.area)
         } else {
-            point_to_polygon(receiver.centre, &shooter.hull)
+            shooter.shape.unoccluded(receiver.centre)
         };
         if f <= 0.0 {
             return (0.0, 0);
@@ -334,7 +335,7 @@ fn exchange(a: &Patch, b: &Patch, tracer: &Tracer) -> (f64, u64) {
     let f: f64 = receiver
         .points
         .iter()
-        .map(|&position| point_to_polygon(SurfacePoint { position, normal }, &shooter.hull))
+        .map(|&position| shooter.shape.unoccluded(SurfacePoint { position, normal }))
         .sum::<f64>()
         / 4.0;
     if f <= 0.0 {

@@ -5,17 +5,12 @@ use glam::DVec3;
 use super::emitter::{AreaEmitter, Emitter};
 use super::patches::Patches;
 use crate::element::{Facet, NONE};
-use crate::geom::Ring;
-use crate::geom::hull::convex_hull;
-use crate::geom::polygon::signed_area;
 
 /// An element that sends what it reflects.
 #[derive(Clone, Debug)]
 pub struct Shooter {
     /// Its shape and radiosity.
     pub emitter: Emitter,
-    /// Corners in world space.
-    pub hull: Vec<DVec3>,
     /// Reflected radiosity `ρ E`.
     pub radiosity: DVec3,
     /// The most by which a part's luminance differs from this one's.
@@ -79,28 +74,11 @@ impl Shooters {
         let index = self.all.len();
         let direct = facet.mean_direct(element) * scale;
         let radiosity = e.reflectance * (direct + indirect);
-        let corners = match &e.cut {
-            Some(cut) => cut.hull.clone(),
-            None => convex_hull(vec![
-                e.min,
-                glam::DVec2::new(e.max.x, e.min.y),
-                e.max,
-                glam::DVec2::new(e.min.x, e.max.y),
-            ]),
-        };
-        let hull: Vec<DVec3> = corners.iter().map(|&p| facet.frame.lift(p)).collect();
-        // A hull larger than its element sends as much as the element does.
-        let share = (e.area / signed_area(&corners)).min(1.0);
+        let parts = facet.parts(element);
         let centre = facet.frame.lift(e.centroid);
-        let rings: [Ring; 1] = [corners];
-        let triangles: Vec<_> = (1..rings[0].len().saturating_sub(1))
-            .map(|i| [rings[0][0], rings[0][i], rings[0][i + 1]])
-            .collect();
-        let emitter = AreaEmitter::new(facet.frame, &rings, &triangles, radiosity * share);
         self.all.push(Shooter {
-            emitter: Emitter::Area(emitter),
-            radius: hull.iter().map(|p| p.distance(centre)).fold(0.0, f64::max),
-            hull,
+            radius: parts.iter().flatten().map(|p| p.distance(centre)).fold(0.0, f64::max),
+            emitter: Emitter::Area(AreaEmitter::new(facet.frame, parts, e.area, radiosity)),
             radiosity,
             spread: 0.0,
             centre,

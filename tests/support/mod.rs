@@ -146,6 +146,7 @@ impl Case<'_> {
             options,
             patch_size: self.patch_size,
             threshold: self.threshold,
+            indirect_threshold: 2.0 * self.threshold,
         };
         solve(&problem, facets, &mut |_| true).expect("nobody cancels")
     }
