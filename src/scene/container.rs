@@ -120,6 +120,14 @@ mod tests {
     }
 
     #[test]
+    fn a_chunk_beyond_the_file_is_refused() {
+        let mut file = glb(&[(JSON_CHUNK, b"{}  ")]);
+        file[12] = 5;
+        assert!(matches!(split(&file), Err(ImportError::Chunk { offset: 12, end: 25, length: 24 })));
+        assert!(matches!(split(&glb(&[(BINARY_CHUNK, b"1234")])), Err(ImportError::NoJsonChunk)));
+    }
+
+    #[test]
     fn text_needs_a_brace() {
         assert_eq!(split(b"\xef\xbb\xbf\n {}").unwrap().json, b"\n {}");
         assert!(matches!(split(b"solid cube"), Err(ImportError::NotGltf)));

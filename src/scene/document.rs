@@ -26,7 +26,6 @@ pub(super) struct Document {
     pub(super) samplers: Vec<Sampler>,
     pub(super) images: Vec<Image>,
     pub(super) lights: Vec<Light>,
-    pub(super) extensions_used: Vec<String>,
     pub(super) extensions_required: Vec<String>,
 }
 
@@ -322,7 +321,6 @@ impl Document {
             samplers: list(json, "samplers", "sampler")?,
             images: list(json, "images", "image")?,
             lights: list(lights, "lights", "light")?,
-            extensions_used: list(json, "extensionsUsed", "extensionsUsed entry")?,
             extensions_required: list(json, "extensionsRequired", "extensionsRequired entry")?,
         })
     }

@@ -5,40 +5,45 @@ use std::fmt;
 /// Longer names are cut: they come from the file and go to a terminal.
 const LONGEST_NAME: usize = 48;
 
-/// A thing in the document, such as `node 3 ("Lamp")` or `mesh 0 ("Wall"), primitive 2`.
+/// A thing in the document, displayed as `node 3 ("Lamp")` or `mesh 0 ("Wall"), primitive 2`.
+///
+/// Boxed, as errors that name two things should stay small.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Item {
+pub struct Item(Box<Parts>);
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Parts {
     /// The singular of the document's list: `node`, `mesh`, `bufferView` …
-    pub kind: &'static str,
+    kind: &'static str,
     /// Index into that list.
-    pub index: usize,
-    /// The name that the document gives it.
-    pub name: Option<String>,
-    /// A part of it that has an index of its own, such as a mesh's primitive.
-    pub part: Option<(&'static str, usize)>,
+    index: usize,
+    name: Option<String>,
+    /// A part that has an index of its own, such as a mesh's primitive.
+    part: Option<(&'static str, usize)>,
 }
 
 impl Item {
     /// The `index`-th entry of the list of `kind`s.
     pub(super) fn new(kind: &'static str, index: usize, name: Option<&str>) -> Self {
         let name = name.filter(|name| !name.is_empty()).map(str::to_owned);
-        Self { kind, index, name, part: None }
+        Self(Box::new(Parts { kind, index, name, part: None }))
     }
 
     /// One part of this item.
     pub(super) fn part(mut self, kind: &'static str, index: usize) -> Self {
-        self.part = Some((kind, index));
+        self.0.part = Some((kind, index));
         self
     }
 }
 
 impl fmt::Display for Item {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {}", self.kind, self.index)?;
-        if let Some(name) = &self.name {
+        let Parts { kind, index, name, part } = &*self.0;
+        write!(f, "{kind} {index}")?;
+        if let Some(name) = name {
             write!(f, " (\"{}\")", shown(name))?;
         }
-        if let Some((kind, index)) = self.part {
+        if let Some((kind, index)) = part {
             write!(f, ", {kind} {index}")?;
         }
         Ok(())

@@ -187,7 +187,7 @@ impl Reader<'_> {
         if layers.specular >= 1.0 && layers.specular_texture.is_none() && layers.base != DVec3::ZERO {
             self.warnings.about(
                 &item,
-                "fully metallic (metallicFactor is 1 where it is absent), so it reflects no diffuse light",
+                "fully metallic or specular (the factor is 1 where it is absent), so it reflects no diffuse light",
             );
         }
     }

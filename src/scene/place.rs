@@ -206,7 +206,7 @@ impl<'a> Placer<'a> {
         let sum = |pairs: &[(usize, f64); 4]| {
             let mut sum = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
             let total: f64 = pairs.iter().map(|(_, weight)| weight).sum();
-            if !(total > 0.0) {
+            if total.is_nan() || total <= 0.0 {
                 return Ok(spot.node.world); // a vertex that no joint moves
             }
             for &(joint, weight) in pairs.iter().filter(|(_, weight)| *weight != 0.0) {
@@ -266,8 +266,7 @@ fn refuse_excess(what: &'static str, present: usize, more: usize) -> Result<(), 
 fn is_flat(corners: [DVec3; 3]) -> bool {
     let [a, b, c] = corners;
     let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    // Written so that NaN counts as flat.
-    !(area_normal(corners).length() > FLAT * longest)
+    area_normal(corners).length() <= FLAT * longest
 }
 
 /// The materials that placed triangles show, as indices into the scene's materials.

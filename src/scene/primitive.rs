@@ -228,12 +228,17 @@ fn triangles(topology: Topology, corners: &[u32]) -> Vec<[u32; 3]> {
     match (topology, corners) {
         (Topology::List, _) => corners.as_chunks().0.to_vec(),
         (Topology::Strip, _) => {
-            let swap = |(k, t): (usize, &[u32; 3])| if k % 2 == 0 { *t } else { [t[0], t[2], t[1]] };
-            corners.array_windows().enumerate().map(swap).collect()
+            let swap = |(k, [a, b, c]): (usize, [u32; 3])| if k % 2 == 0 { [a, b, c] } else { [a, c, b] };
+            runs(corners).enumerate().map(swap).collect()
         }
-        (Topology::Fan, [hub, rim @ ..]) => rim.array_windows().map(|&[a, b]| [a, b, *hub]).collect(),
+        (Topology::Fan, [hub, rim @ ..]) => runs(rim).map(|[a, b]| [a, b, *hub]).collect(),
         (Topology::Fan, []) => Vec::new(),
     }
+}
+
+/// Each `N` corners that follow one another.
+fn runs<const N: usize>(corners: &[u32]) -> impl Iterator<Item = [u32; N]> {
+    corners.windows(N).filter_map(|run| run.try_into().ok())
 }
 
 #[cfg(test)]

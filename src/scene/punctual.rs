@@ -46,7 +46,7 @@ fn light(entry: &Light, item: &Item, node: PlacedNode, warnings: &mut Warnings) 
         return None;
     }
     let position = node.world.translation;
-    if !(position.abs().max_element() <= MAX_COORDINATE) {
+    if !position.is_finite() || position.abs().max_element() > MAX_COORDINATE {
         warnings.about(item, "it is too far away or nowhere, so it is left out");
         return None;
     }

@@ -348,7 +348,7 @@ mod tests {
 
     #[test]
     fn large_images_are_reduced_without_changing_their_mean() {
-        let stripes = |x: usize, _: usize| Vec3::splat(if x % 2 == 0 { 0.0 } else { 1.0 });
+        let stripes = |x: usize, _: usize| Vec3::splat(if x.is_multiple_of(2) { 0.0 } else { 1.0 });
         let pyramid = Pyramid::new(2 * LARGEST_SIDE, 3, stripes);
         assert_eq!(pyramid.levels[0].side, 2);
         assert!((pyramid.mean() - 0.5).abs().max_element() < EXACT);
