@@ -13,6 +13,7 @@ use std::fs;
 
 use cobake::export::{ExportError, decode_exr, encode, encode_png, verify, write};
 use cobake::options::{Quantity, Topology};
+use cobake::scene::SourceDocument;
 use fixture::{Results, document, vectors};
 use glam::{DVec2, DVec3};
 use serde_json::{Value, json};
@@ -318,32 +319,23 @@ fn bytes_repeat() {
 }
 
 /// Baking a baked file gives a file of the same make and size: nothing piles up.
+///
+/// The lit floor is not split, so its mesh is the same the second time.
 #[test]
 fn baking_again_adds_nothing() {
-    let first = Output::of(&results());
-    let again = |output: Output| {
-        let images = output.json["images"].as_array().unwrap().len();
-        let source = cobake::scene::SourceDocument {
-            json: output.json,
-            buffers: vec![output.binary],
-            external_images: vec![None; images],
-        };
-        source
-    };
-    let json = first.json.clone();
-    let size = first.binary.len();
-    let source = again(first);
-    // The cube's vertices are split by now, so only the lists' lengths are compared, not the meshes.
-    let mut plain = document();
-    plain.json["nodes"] = json!([{"name": "floor", "mesh": 1}]);
-    plain.json["scenes"] = json!([{"nodes": [0]}]);
-    plain.json.as_object_mut().unwrap().shift_remove("animations");
-    assert!(size > 0 && !source.buffers[0].is_empty());
-    let once = Output::of(&Results::of(plain));
-    let (bytes, lists) = (once.binary.len(), counts(&once.json));
-    let twice = Output::of(&Results::of(again(once)));
-    assert_eq!((twice.binary.len(), counts(&twice.json)), (bytes, lists));
-    assert!(json["extensions"]["COBAKE_lightmap"].is_object());
+    let mut source = document();
+    source.json["nodes"] = json!([{"name": "floor", "mesh": 1}]);
+    source.json["scenes"] = json!([{"nodes": [0]}]);
+    source.json.as_object_mut().unwrap().shift_remove("animations");
+    let once = Output::of(&Results::of(source));
+    let before = (once.binary.len(), counts(&once.json));
+    let images = once.json["images"].as_array().unwrap().len();
+    let twice = Output::of(&Results::of(SourceDocument {
+        json: once.json,
+        buffers: vec![once.binary],
+        external_images: vec![None; images],
+    }));
+    assert_eq!((twice.binary.len(), counts(&twice.json)), before);
 }
 
 fn counts(json: &Value) -> Vec<usize> {
@@ -463,8 +455,8 @@ fn results_that_do_not_belong_together_are_refused() {
         encode(&results.baked()).unwrap_err().to_string()
     };
     for message in [
-        refused(|r| drop(r.atlas.charts.pop())),
-        refused(|r| drop(r.mesh.surfaces.pop())),
+        refused(|r| r.atlas.charts.truncate(1)),
+        refused(|r| r.mesh.surfaces.truncate(1)),
         refused(|r| r.surfaces[0].source_triangles.push(1_000_000)),
         refused(|r| r.scene.vertices.truncate(9)),
         refused(|r| r.scene.placements[1].node = 0),
