@@ -161,6 +161,23 @@ fn nonsense_gives_nothing() {
     }
 }
 
+/// From a hotel room's lamp: where the triangle is thinner than `snap`, the contact's end bent the
+/// contact back across the edge that it had just been cut at, round after round.
+#[test]
+fn a_contact_through_a_thin_end_is_not_refused() {
+    let thin: Ring = [(0.0, 0.0), (0.0712330711561611, 0.0), (1.987575342401771e-5, 0.0007879813019743255)]
+        .map(DVec2::from)
+        .to_vec();
+    let contact = [(0.07060140499410199, 8.30700267458516e-5), (0.07060952567074526, 0.0)].map(DVec2::from);
+    let rings = [thin];
+    let input = PlaneInput { rings: &rings, contacts: &[contact], points: &[], snap: 1.212278079181119e-5 };
+    let result = subdivide(arrange(input));
+    assert_eq!(result.dropped, 0);
+    let area: f64 =
+        result.faces.iter().map(|f| result.triangle(f)).map(|[a, b, c]| polygon::orient(a, b, c) / 2.0).sum();
+    assert!((area / polygon::area(&rings) - 1.0).abs() < AREA);
+}
+
 /// A star around the origin with `corners` corners, radii between 0.3 and 1.
 fn star(random: &mut Random, corners: usize) -> Ring {
     (0..corners)
