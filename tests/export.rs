@@ -477,6 +477,20 @@ fn names(folder: &std::path::Path) -> Vec<String> {
     names
 }
 
+/// A link stays a link; what it points to is replaced.
+#[cfg(unix)]
+#[test]
+fn links_are_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let glb = encode(&results().baked()).unwrap();
+    let (file, link) = (folder.path().join("file.glb"), folder.path().join("link.glb"));
+    fs::write(&file, "old").unwrap();
+    std::os::unix::fs::symlink("file.glb", &link).unwrap();
+    write(&link, &glb).unwrap();
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert_eq!(fs::read(&file).unwrap(), glb);
+}
+
 #[test]
 fn files_are_replaced_whole() {
     let folder = tempfile::tempdir().unwrap();
@@ -505,7 +519,16 @@ fn failures_leave_nothing_behind() {
     let missing = folder.path().join("none/out.glb");
     let message = write(&missing, &glb).unwrap_err().to_string();
     assert!(message.contains("none") && message.contains("create it"), "{message}");
-    assert!(write(std::path::Path::new("/dev/null"), &glb).is_err());
+    #[cfg(target_os = "linux")]
+    {
+        let device = write(std::path::Path::new("/dev/null"), &glb);
+        assert!(matches!(device, Err(ExportError::NotAFile { .. })), "{device:?}");
+        // A folder that not even the system's owner can create files in.
+        let closed = write(std::path::Path::new("/proc/out.glb"), &glb);
+        assert!(matches!(closed, Err(ExportError::Create { .. })), "{closed:?}");
+    }
+    let long = folder.path().join(format!("{}.glb", "x".repeat(300)));
+    assert!(write(&long, &glb).is_err());
     assert_eq!(names(folder.path()), ["inside", "out.glb"]);
     assert!(names(&inside).is_empty());
 }
