@@ -6,15 +6,16 @@
     reason = "a test may fail; clippy sees tests but not what they call"
 )]
 
+#[path = "export/files.rs"]
+mod files;
 #[path = "export/fixture.rs"]
 mod fixture;
 
-use std::fs;
-
-use cobake::export::{ExportError, decode_exr, encode, encode_png, verify, write};
+use cobake::export::{decode_exr, encode, encode_png, verify};
 use cobake::options::{Quantity, Topology};
+use cobake::raster::Lightmap;
 use cobake::scene::SourceDocument;
-use fixture::{Results, document, vectors};
+use fixture::{Maker, Results, document, vectors};
 use glam::{DVec2, DVec3};
 use serde_json::{Value, json};
 
@@ -187,6 +188,45 @@ fn unsplit_primitives_share_the_source() {
     assert_eq!(lit["attributes"]["POSITION"], unlit["attributes"]["POSITION"]);
     assert_eq!(lit["attributes"]["TEXCOORD_0"], unlit["attributes"]["TEXCOORD_0"]);
     assert!(unlit["attributes"].get("TEXCOORD_1").is_none() && unlit.get("material").is_none());
+}
+
+/// Two primitives that draw from one pool still do after a split; what neither uses is left out of it.
+#[test]
+fn primitives_keep_sharing_a_pool() {
+    let mut maker = Maker::default();
+    let pool: [[f32; 3]; 7] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [90.0, 80.0, 70.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [0.0, 1.0, -1.0],
+        [1.0, 1.0, -1.0],
+    ];
+    let position = maker.floats(&pool);
+    let mut quad =
+        |indices: &[u16]| json!({"attributes": {"POSITION": position}, "indices": maker.indices(indices)});
+    let (front, top) = (quad(&[0, 1, 4, 0, 4, 3]), quad(&[3, 4, 6, 3, 6, 5]));
+    let output = Output::of(&Results::of(SourceDocument {
+        json: json!({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"name": "fold", "mesh": 0}],
+            "meshes": [{"primitives": [front, top]}],
+            "buffers": [{"byteLength": maker.buffer.len()}], "bufferViews": maker.views, "accessors": maker.accessors,
+        }),
+        buffers: vec![maker.buffer],
+        external_images: Vec::new(),
+    }));
+    let mesh = &output.json["meshes"][0]["primitives"];
+    assert_eq!(mesh[0]["attributes"], mesh[1]["attributes"]);
+    let accessor = &output.json["accessors"][number(&mesh[0]["attributes"]["POSITION"])];
+    assert_eq!((&accessor["min"], &accessor["max"]), (&json!([0.0, 0.0, -1.0]), &json!([1.0, 1.0, 0.0])));
+    let positions = output.floats(&mesh[0]["attributes"]["POSITION"]);
+    assert_eq!(positions.len(), 8, "six vertices, two of them twice");
+    for (primitive, indices) in [(0, [0, 1, 4, 0, 4, 3]), (1, [3, 4, 6, 3, 6, 5])] {
+        for (vertex, source) in output.indices(&mesh[primitive]).into_iter().zip(indices) {
+            assert_eq!(positions[vertex], pool[source].map(f64::from));
+        }
+    }
 }
 
 /// Nothing but meshes, materials and the lists of data differs; names are those of before.
@@ -468,58 +508,43 @@ fn results_that_do_not_belong_together_are_refused() {
     }
 }
 
-fn names(folder: &std::path::Path) -> Vec<String> {
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
+/// Replaces the `pick`-th number of a document; says whether there are as many.
+fn damage(value: &mut Value, pick: &mut usize, by: &Value) -> bool {
+    match value {
+        Value::Array(list) => list.iter_mut().any(|value| damage(value, pick, by)),
+        Value::Object(map) => map.values_mut().any(|value| damage(value, pick, by)),
+        Value::Number(_) if *pick == 0 => {
+            *value = by.clone();
+            true
+        }
+        Value::Number(_) => {
+            *pick -= 1;
+            false
+        }
+        _ => false,
+    }
 }
 
+/// Any one number of the document may be nonsense: the result is a file or an error.
 #[test]
-fn files_are_replaced_whole() {
-    let folder = tempfile::tempdir().unwrap();
-    let glb = encode(&results().baked()).unwrap();
-    let path = folder.path().join("out.glb");
-    fs::write(&path, "old").unwrap();
-    write(&path, &glb).unwrap();
-    assert_eq!(fs::read(&path).unwrap(), glb);
-    assert_eq!(names(folder.path()), ["out.glb"]);
-}
-
-/// A bad document changes nothing, a folder or a missing place is named, and nothing is left behind.
-#[test]
-fn failures_leave_nothing_behind() {
-    let folder = tempfile::tempdir().unwrap();
-    let glb = encode(&results().baked()).unwrap();
-    let path = folder.path().join("out.glb");
-    fs::write(&path, "old").unwrap();
-    assert!(write(&path, &glb[..glb.len() - 8]).is_err());
-    assert!(write(&path, b"glTF").is_err());
-    assert_eq!(fs::read(&path).unwrap(), b"old");
-
-    let inside = folder.path().join("inside");
-    fs::create_dir(&inside).unwrap();
-    assert!(matches!(write(&inside, &glb), Err(ExportError::NotAFile { .. })));
-    let missing = folder.path().join("none/out.glb");
-    let message = write(&missing, &glb).unwrap_err().to_string();
-    assert!(message.contains("none") && message.contains("create it"), "{message}");
-    assert!(write(std::path::Path::new("/dev/null"), &glb).is_err());
-    assert_eq!(names(folder.path()), ["inside", "out.glb"]);
-    assert!(names(&inside).is_empty());
-}
-
-/// glTF text carries its buffer inside and reads like the GLB.
-#[test]
-fn gltf_text_is_self_contained() {
-    let folder = tempfile::tempdir().unwrap();
-    let glb = encode(&results().baked()).unwrap();
-    let path = folder.path().join("out.gltf");
-    write(&path, &glb).unwrap();
-    let (_, from_text, pictures) = gltf::import(&path).unwrap();
-    let (_, from_glb, _) = gltf::import_slice(&glb).unwrap();
-    assert_eq!(from_text[0].0, from_glb[0].0);
-    assert_eq!(pictures.len(), 2);
-    assert_eq!(names(folder.path()), ["out.gltf"]);
+fn damaged_documents_never_panic() {
+    let mut results = results();
+    results.lightmap = Lightmap { width: 1, height: 1, texels: vec![[1.0; 3]] };
+    let whole = results.scene.source.json.clone();
+    let (mut written, mut refused) = (0, 0);
+    for by in [json!(0), json!(3), json!(-1), json!(1_000_000), json!(0.5)] {
+        for number in 0.. {
+            results.scene.source.json = whole.clone();
+            if !damage(&mut results.scene.source.json, &mut { number }, &by) {
+                break;
+            }
+            let adaptive = number % 2 == 1; // each topology meets half of the faults
+            results.options.topology = if adaptive { Topology::Adaptive } else { Topology::Source };
+            match encode(&results.baked()) {
+                Ok(_) => written += 1,
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    assert!(written > 100 && refused > 100, "{written} written, {refused} refused");
 }

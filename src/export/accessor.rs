@@ -162,6 +162,15 @@ pub(super) fn read(source: &SourceDocument, index: usize, count: usize) -> Resul
     Ok(elements)
 }
 
+/// The bytes that an accessor covers of its bufferView: first and end. `stride` is the view's.
+pub(super) fn extent(accessor: &Object, stride: Option<usize>) -> Option<(usize, usize)> {
+    let component = index_of(accessor.get("componentType")).and_then(Component::from_number)?;
+    let (_, size) = shape(accessor.get("type")?.as_str()?, component.size())?;
+    let offset = index_of(accessor.get("byteOffset")).unwrap_or(0);
+    let run = Run { offset, count: index_of(accessor.get("count"))?, size };
+    Some((offset, run.end(stride.unwrap_or(size))?))
+}
+
 /// Components and bytes of a type; matrices start each column at a multiple of 4 bytes.
 fn shape(kind: &str, component: usize) -> Option<(usize, usize)> {
     let vector = |n: usize| (n, n * component);
@@ -186,6 +195,16 @@ struct Run {
     size: usize,
 }
 
+impl Run {
+    /// The end of the last element; `None` where that is beyond all memory.
+    fn end(self, stride: usize) -> Option<usize> {
+        match self.count.checked_sub(1) {
+            Some(last) => last.checked_mul(stride)?.checked_add(self.offset)?.checked_add(self.size),
+            None => Some(self.offset),
+        }
+    }
+}
+
 /// Copies elements out of a view, closing the gaps of its stride.
 fn gather(source: &SourceDocument, index: usize, run: Run) -> Result<Vec<u8>, ExportError> {
     let problem = |problem| ExportError::Malformed { list: "bufferView", index, problem };
@@ -194,11 +213,8 @@ fn gather(source: &SourceDocument, index: usize, run: Run) -> Result<Vec<u8>, Ex
     let (buffer, start, end) = span(view, index, &source.buffers)?;
     let bytes = source.buffers.get(buffer).and_then(|bytes| bytes.get(start..end)).unwrap_or_default();
     let stride = index_of(view.get("byteStride")).filter(|&stride| stride > 0).unwrap_or(run.size);
-    let short = problem("is shorter than an accessor that reads it");
-    let last = run.count.saturating_sub(1).checked_mul(stride).and_then(|at| at.checked_add(run.offset));
-    let needed = if run.count == 0 { Some(0) } else { last.and_then(|at| at.checked_add(run.size)) };
-    if needed.is_none_or(|needed| needed > bytes.len()) {
-        return Err(short);
+    if run.end(stride).is_none_or(|end| end > bytes.len()) {
+        return Err(problem("is shorter than an accessor that reads it"));
     }
     let mut packed = Vec::with_capacity(run.count * run.size);
     for element in 0..run.count {

@@ -3,14 +3,14 @@
 //! Every lit primitive becomes the triangles of its surfaces, in its node's space, so that nodes and
 //! their animations stay as they are. The attributes are `POSITION`, `NORMAL` (flat), `TEXCOORD_1`,
 //! `_IRRADIANCE` (direct and indirect irradiance of the vertex, linear RGB, in the scene's units),
-//! and the source's texture coordinates and colours, interpolated.
+//! and the source's texture coordinates, colours and tangents, interpolated.
 //!
 //! A node keeps its own triangles where its shape is not its triangles' alone: skins and morph
 //! targets; and where its transform cannot be undone (a scale of 0).
 
 use std::collections::BTreeMap;
 
-use glam::{DMat4, DVec2, DVec3};
+use glam::{DMat4, DVec2, DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::ExportError;
@@ -109,7 +109,7 @@ impl Builder {
         let mismatch = || ExportError::Mismatch { what: "meshes of the surfaces" };
         // Normals transform with the inverse of the transpose: here that of node from world.
         let normal = self.node_from_world.inverse().transpose().transform_vector3(part.surface.frame.normal);
-        let normal = normal.normalize_or_zero().as_vec3().to_array();
+        let normal = normal.normalize_or(DVec3::Z).as_vec3();
         let locator = (self.rows.width > 0).then(|| locator(writer, part.surface));
         let mut copies: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &triangle in &part.mesh.triangles {
@@ -122,7 +122,8 @@ impl Builder {
             let mut out = [0; 3];
             for (slot, (corner, vertex)) in out.iter_mut().zip(triangle.into_iter().zip(&vertices)) {
                 let row = locator.as_ref().map(|l| l.interpolate(&self.rows, vertex.position, centre));
-                let row = row.unwrap_or_default();
+                let mut row = row.unwrap_or_default();
+                self.rows.settle_tangent(&mut row, normal);
                 let known = copies.entry(corner).or_default();
                 *slot = match known.iter().find(|&&copy| self.has_row(copy, &row)) {
                     Some(&copy) => copy,
@@ -141,12 +142,12 @@ impl Builder {
     }
 
     /// Adds a vertex but for its row and returns its index.
-    fn push(&mut self, writer: &Writer, part: &Part, vertex: &MeshVertex, normal: [f32; 3]) -> Option<u32> {
+    fn push(&mut self, writer: &Writer, part: &Part, vertex: &MeshVertex, normal: Vec3) -> Option<u32> {
         let index = u32::try_from(self.positions.len() / 3).ok()?;
         let world = part.surface.frame.lift(vertex.position);
         let local = self.node_from_world.transform_point3(world).as_vec3();
         self.positions.extend(local.to_array());
-        self.normals.extend(normal);
+        self.normals.extend(normal.to_array());
         self.coordinates.extend(chart_coordinates(writer.baked, part.index, world));
         self.irradiance.extend((vertex.direct + vertex.indirect).as_vec3().to_array());
         Some(index)

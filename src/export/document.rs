@@ -185,7 +185,7 @@ impl<'a> Document<'a> {
     /// Packs the document into a GLB: data that the changes left without a reader are dropped,
     /// all others end up in one buffer.
     pub(super) fn finish(mut self) -> Result<Vec<u8>, ExportError> {
-        self.before.drop_orphans(&mut self.root, &mut self.added);
+        self.before.drop_orphans(&mut self.root, &self.source.buffers, &mut self.added);
         let binary = layout::pack(&mut self.root, &self.source.buffers, &self.added)?;
         glb::pack(&Value::Object(self.root), &binary)
     }

@@ -108,7 +108,7 @@ pub enum ExportError {
     },
 
     /// The output path names a folder or a device.
-    #[error("{} is not a file; name a file to write, such as {}", path.display(), path.join("baked.glb").display())]
+    #[error("{} is a folder or a device; give the name of a file, such as baked.glb", path.display())]
     NotAFile {
         /// The path given.
         path: PathBuf,

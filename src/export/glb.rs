@@ -93,6 +93,16 @@ mod tests {
         assert!(gltf::Glb::from_slice(&glb).is_ok(), "another reader must agree");
     }
 
+    /// Numbers that a careless reader changes in the last digit (all from real scenes).
+    #[test]
+    fn numbers_stay_to_the_last_digit() {
+        let text = "[-185.00001525878906,0.9537169507482269,-0.10452846326765347,0.9126079678535461,1.0,7]";
+        let json: Value = serde_json::from_str(text).unwrap();
+        let glb = pack(&json, &[]).unwrap();
+        let kept = glb.windows(text.len()).any(|window| window == text.as_bytes());
+        assert!(kept, "{json}");
+    }
+
     #[test]
     fn damaged_containers_are_refused() {
         let glb = pack(&serde_json::json!({}), &[0; 64]).unwrap();

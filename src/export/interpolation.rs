@@ -1,20 +1,23 @@
-//! Carrying the source's texture coordinates and colours over to other triangles of the same surface.
+//! Carrying the source's texture coordinates, colours and tangents over to other triangles of the same
+//! surface.
 //!
 //! A corner of a new triangle takes its values from the source triangle that holds the corner,
 //! moved a little towards the new triangle's middle: where texture coordinates jump along an edge of
 //! the source, each side gets its own values. The weights are those of the corner itself, so that
 //! values that are affine over the surface come out exactly.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::document::{Object, index_of};
-use super::primitive::set_name;
 use super::{ExportError, accessor};
 use crate::geom::polygon::orient;
 use crate::scene::SourceDocument;
 
 /// The most grid cells along a side: bounds the memory that slivers can take.
 const SIDE_LIMIT: usize = 32;
+
+/// The attribute that must stay a direction in the surface, with a sign.
+const TANGENT: &str = "TANGENT";
 
 /// How far towards its triangle's middle a corner is moved to choose a source triangle.
 const NUDGE: f64 = 1e-3;
@@ -30,7 +33,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Reads `TEXCOORD_n` and `COLOR_n` of a primitive with `count` vertices.
+    /// Reads `TEXCOORD_n`, `COLOR_n` and `TANGENT` of a primitive with `count` vertices.
     ///
     /// The lightmap's own set must be gone from `attributes`.
     pub(super) fn read(
@@ -58,6 +61,21 @@ impl Rows {
         Ok(Self { columns, width, values })
     }
 
+    /// Makes a row's tangent a unit vector at right angles to the unit `normal`, its fourth number 1 or −1.
+    pub(super) fn settle_tangent(&self, row: &mut [f32], normal: Vec3) {
+        let mut start = 0;
+        for (name, components) in &self.columns {
+            if let (TANGENT, Some([x, y, z, sign])) = (name.as_str(), row.get_mut(start..start + components))
+            {
+                let tangent = Vec3::new(*x, *y, *z).reject_from_normalized(normal);
+                let tangent = tangent.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+                [*x, *y, *z] = tangent.to_array();
+                *sign = if *sign < 0.0 { -1.0 } else { 1.0 };
+            }
+            start += components;
+        }
+    }
+
     /// One vertex's row.
     fn row(&self, vertex: u32) -> &[f32] {
         let start = (vertex as usize).saturating_mul(self.width);
@@ -66,7 +84,7 @@ impl Rows {
 }
 
 fn is_interpolated(name: &str) -> bool {
-    name == set_name(0) || name.starts_with("TEXCOORD_") || name.starts_with("COLOR_")
+    name == TANGENT || name.starts_with("TEXCOORD_") || name.starts_with("COLOR_")
 }
 
 /// A source triangle in its surface's plane.
@@ -187,7 +205,7 @@ mod tests {
                 triangles.push(PlaneTriangle { corners: [corners[a], corners[b], corners[c]], vertices });
             }
         }
-        (Locator::new(triangles), Rows { columns: vec![(set_name(0), 2)], width: 2, values })
+        (Locator::new(triangles), Rows { columns: vec![("TEXCOORD_0".into(), 2)], width: 2, values })
     }
 
     /// An affine map comes out exactly wherever the corner lies, on a jump on the side of the triangle.
@@ -205,6 +223,20 @@ mod tests {
                 assert_eq!(row[1], side, "{n} cells, {corner} seen from {centre}");
             }
         }
+    }
+
+    #[test]
+    fn tangents_lie_in_the_surface() {
+        let columns = vec![("COLOR_0".into(), 3), (TANGENT.into(), 4)];
+        let rows = Rows { columns, width: 7, values: Vec::new() };
+        for (tangent, expected) in [([0.6, 0.3, 0.0], [1.0, 0.0, 0.0]), ([0.0, -2.0, 1.0], [0.0, 0.0, 1.0])] {
+            let mut row = vec![9.0, 8.0, 7.0, tangent[0], tangent[1], tangent[2], -0.3];
+            rows.settle_tangent(&mut row, Vec3::Y);
+            assert_eq!(row, [9.0, 8.0, 7.0, expected[0], expected[1], expected[2], -1.0]);
+        }
+        let mut along = vec![0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0];
+        rows.settle_tangent(&mut along, Vec3::Y);
+        assert!(Vec3::new(along[3], along[4], along[5]).is_normalized() && along[4] == 0.0);
     }
 
     #[test]

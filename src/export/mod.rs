@@ -18,6 +18,7 @@
 
 mod accessor;
 mod adaptive;
+mod compact;
 mod document;
 mod error;
 mod exr;

@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
+use super::compact::compact;
 use super::document::{Object, index_of};
 
 /// Extensions whose references to accessors and bufferViews are known: none, or visited below.
@@ -54,8 +55,14 @@ impl References {
         found
     }
 
-    /// Drops from `root` what these references had and `root` no longer refers to.
-    pub(super) fn drop_orphans(&self, root: &mut Object, added: &mut BTreeMap<usize, Vec<u8>>) {
+    /// Drops from `root` what these references had and `root` no longer refers to, and the gaps that
+    /// this leaves in views of `buffers`.
+    pub(super) fn drop_orphans(
+        &self,
+        root: &mut Object,
+        buffers: &[Vec<u8>],
+        added: &mut BTreeMap<usize, Vec<u8>>,
+    ) {
         let used = root.get("extensionsUsed").and_then(Value::as_array);
         let known = |name: &Value| {
             name.as_str().is_some_and(|name| KNOWN.contains(&name) || name.starts_with(KNOWN_PREFIX))
@@ -65,8 +72,15 @@ impl References {
         }
         let now = Self::of(root);
         let orphans: BTreeSet<usize> = self.accessors.difference(&now.accessors).copied().collect();
+        let accessors = root.get("accessors").and_then(Value::as_array);
+        let gone = orphans.iter().filter_map(|&orphan| accessors?.get(orphan));
+        let mut touched: BTreeSet<usize> = gone.filter_map(|gone| index_of(gone.get("bufferView"))).collect();
         remove(root, "accessors", &orphans);
         visit_accessors(root, &mut |value| renumber(value, &orphans));
+        visit_other_views(root, &mut |value| {
+            index_of(Some(value)).map(|view| touched.remove(&view));
+        });
+        compact(root, &touched, buffers, added);
 
         // Only now, since the accessors that went took references to views with them.
         let now = Self::of(root);
@@ -137,6 +151,13 @@ fn visit_accessors(root: &mut Object, visit: &mut impl FnMut(&mut Value)) {
 fn visit_views(root: &mut Object, visit: &mut impl FnMut(&mut Value)) {
     for accessor in entries(root, "accessors") {
         accessor.get_mut("bufferView").into_iter().for_each(&mut *visit);
+    }
+    visit_other_views(root, visit);
+}
+
+/// Calls `visit` with every index of a bufferView that is not an accessor's own.
+fn visit_other_views(root: &mut Object, visit: &mut impl FnMut(&mut Value)) {
+    for accessor in entries(root, "accessors") {
         for part in ["indices", "values"] {
             let view = child(accessor, &["sparse", part]).and_then(|part| part.get_mut("bufferView"));
             view.into_iter().for_each(&mut *visit);
@@ -188,7 +209,7 @@ mod tests {
         let before = References::of(&mut root);
         root["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().shift_remove("NORMAL");
         let mut added = BTreeMap::from([(6, vec![1])]);
-        before.drop_orphans(&mut root, &mut added);
+        before.drop_orphans(&mut root, &[], &mut added);
         assert_eq!(root["bufferViews"], json!(["a", "b", "d", "e", "f", "g"]));
         assert_eq!(root["accessors"].as_array().unwrap().len(), 3);
         assert_eq!(root["meshes"][0]["primitives"][0]["indices"], 2);
@@ -203,7 +224,7 @@ mod tests {
         let before = References::of(&mut root);
         root.shift_remove("meshes");
         let expected = root.clone();
-        before.drop_orphans(&mut root, &mut BTreeMap::new());
+        before.drop_orphans(&mut root, &[], &mut BTreeMap::new());
         assert_eq!(root, expected);
     }
 }

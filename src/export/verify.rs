@@ -57,19 +57,29 @@ pub fn verify(glb: &[u8]) -> Result<(), ExportError> {
 /// That crate refuses what our own reader puts up with, so a refusal only counts as ours if the
 /// source passed. Required extensions are none of its business here.
 pub(super) fn still_accepted(source: &Value, glb: &[u8]) -> Result<(), ExportError> {
-    let accepts = |mut json: Value| {
-        if let Some(root) = json.as_object_mut() {
-            root.shift_remove("extensionsRequired");
-        }
-        let root = gltf::json::deserialize::from_value(json).map_err(gltf::Error::Deserialize)?;
-        gltf::Document::from_json(root)
-    };
-    match accepts(glb::unpack(glb)?.0) {
-        Err(source_error) if accepts(source.clone()).is_ok() => {
-            Err(ExportError::NotReadable { source: source_error })
-        }
+    match accept(glb::unpack(glb)?.0) {
+        Err(refusal) if accept(source.clone()).is_ok() => Err(refusal),
         _ => Ok(()),
     }
+}
+
+fn accept(mut json: Value) -> Result<(), ExportError> {
+    // The crate's validation indexes the accessors with this one number unchecked.
+    let accessors = json.get("accessors").and_then(Value::as_array).map_or(0, Vec::len);
+    let meshes = json.get("meshes").and_then(Value::as_array).into_iter().flatten();
+    let primitives = meshes.filter_map(|mesh| mesh.get("primitives")?.as_array()).flatten();
+    let mut positions = primitives.filter_map(|primitive| primitive.get("attributes")?.get("POSITION"));
+    if !positions.all(|index| index_of(Some(index)).is_some_and(|index| index < accessors)) {
+        return Err(ExportError::NotBaked { problem: "a primitive's positions are not there" });
+    }
+    if let Some(root) = json.as_object_mut() {
+        root.shift_remove("extensionsRequired");
+    }
+    gltf::json::deserialize::from_value(json)
+        .map_err(gltf::Error::Deserialize)
+        .and_then(gltf::Document::from_json)
+        .map_err(|source| ExportError::NotReadable { source })?;
+    Ok(())
 }
 
 fn bytes_of<'b>(view: &Value, binary: &'b [u8]) -> Option<&'b [u8]> {
