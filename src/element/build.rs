@@ -188,7 +188,8 @@ impl Facet {
                 };
                 let corner = |i, j| DVec2::new(at(i, columns, min.x, max.x), at(j, rows, min.y, max.y));
                 let rectangle = (corner(column, row), corner(column + 1, row + 1));
-                if let Some(child) = self.add_element(element, rectangle, cell, (&rings, &parts), appearance) {
+                if let Some(child) = self.add_element(element, rectangle, cell, (&rings, &parts), appearance)
+                {
                     children[count] = child;
                     count += 1;
                 }
@@ -216,19 +217,20 @@ impl Facet {
         let [x0, y0, x1, y1] = cell;
         let keys = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
         let is_full = area >= full_area * (1.0 - LEAST_SHARE);
+        let parts = if is_full { Vec::new() } else { clip_rings(parts, min, max) };
         let samples: [u32; 4] = std::array::from_fn(|k| {
             if is_full {
                 self.corner_sample(keys[k], corners[k], 0.5 * (min + max))
             } else {
-                self.nearest_sample(&rings, corners[k], centroid)
+                self.nearest_sample(&parts, corners[k], centroid)
             }
         });
         let cut = (!is_full).then(|| {
             let positions = samples.map(|s| self.samples[s as usize].position);
             Box::new(Cut {
-                hull: convex_hull(rings.iter().flatten().copied().collect()),
+                hull: convex_hull(parts.iter().flatten().copied().collect()),
                 corners_from_samples: plane_fit(positions, min, max),
-                parts: clip_rings(parts, min, max),
+                parts,
                 rings,
             })
         });

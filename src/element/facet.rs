@@ -80,13 +80,18 @@ impl Facet {
         }
     }
 
+    /// Whether `p`, inside the element's rectangle, lies inside the outline.
+    #[must_use]
+    pub fn contains(&self, element: u32, p: DVec2) -> bool {
+        let contains = |part: &Ring| crate::geom::polygon::contains(std::slice::from_ref(part), p);
+        self.elements[element as usize].cut.as_ref().is_none_or(|c| c.parts.iter().any(contains))
+    }
+
     /// The element's area as convex polygons in world space, counter-clockwise seen from the receiving side.
     #[must_use]
     pub fn parts(&self, element: u32) -> Vec<Vec<DVec3>> {
         match &self.elements[element as usize].cut {
-            Some(cut) => {
-                cut.parts.iter().map(|p| p.iter().map(|&q| self.frame.lift(q)).collect()).collect()
-            }
+            Some(cut) => cut.parts.iter().map(|p| p.iter().map(|&q| self.frame.lift(q)).collect()).collect(),
             None => vec![self.hull(element)],
         }
     }
@@ -133,18 +138,20 @@ impl Facet {
         (direct.max(DVec3::ZERO), indirect.max(DVec3::ZERO))
     }
 
-    /// Mean direct irradiance over `element`, its parts and its ancestors included.
+    /// Mean direct and indirect irradiance over `element`, its parts and its ancestors included.
     #[must_use]
-    pub fn mean_direct(&self, element: u32) -> DVec3 {
+    pub fn mean(&self, element: u32) -> (DVec3, DVec3) {
         let e = &self.elements[element as usize];
         if e.is_leaf() {
-            return self.received(element, e.centroid).0;
+            return self.received(element, e.centroid);
         }
-        let (sum, area) = e.children().fold((DVec3::ZERO, 0.0), |(sum, area), c| {
-            let a = self.elements[c as usize].area;
-            (sum + a * self.mean_direct(c), area + a)
-        });
-        sum / area
+        let (direct, indirect, area) =
+            e.children().fold((DVec3::ZERO, DVec3::ZERO, 0.0), |(direct, indirect, area), c| {
+                let a = self.elements[c as usize].area;
+                let (d, i) = self.mean(c);
+                (direct + a * d, indirect + a * i, area + a)
+            });
+        (direct / area, indirect / area)
     }
 
     /// The leaves in tree order.

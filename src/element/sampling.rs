@@ -24,16 +24,16 @@ impl Facet {
         sample
     }
 
-    /// A sample inside `rings` as near to `corner` as can be.
-    pub(super) fn nearest_sample(&mut self, rings: &[Ring], corner: DVec2, centroid: DVec2) -> u32 {
-        let foot = if contains(rings, corner) { corner } else { nearest_on_rings(rings, corner) };
+    /// A sample inside convex `parts` as near to `corner` as can be.
+    pub(super) fn nearest_sample(&mut self, parts: &[Ring], corner: DVec2, centroid: DVec2) -> u32 {
+        let foot = nearest_in_parts(parts, corner);
         // The centroid of a concave piece may lie outside, and then a longer step may leave it.
         let step = self.nudge;
         let inside = [step, 4.0 * step, 0.25 * step]
             .into_iter()
             .map(|s| toward(foot, centroid, s))
-            .find(|&p| contains(rings, p))
-            .unwrap_or(foot);
+            .find(|&p| parts.iter().any(|part| contains(std::slice::from_ref(part), p)))
+            .unwrap_or_else(|| toward(foot, middle_of_nearest(parts, foot), step));
         self.add_sample(inside)
     }
 
@@ -54,10 +54,21 @@ fn toward(from: DVec2, to: DVec2, step: f64) -> DVec2 {
     if length == 0.0 { from } else { from + d * (step / length).min(0.5) }
 }
 
-fn nearest_on_rings(rings: &[Ring], p: DVec2) -> DVec2 {
-    let edges = rings.iter().flat_map(|r| (0..r.len()).map(|i| (r[i], r[(i + 1) % r.len()])));
+/// The point of convex `parts` nearest to `p`.
+fn nearest_in_parts(parts: &[Ring], p: DVec2) -> DVec2 {
+    if parts.iter().any(|part| contains(std::slice::from_ref(part), p)) {
+        return p;
+    }
+    let edges = parts.iter().flat_map(|r| (0..r.len()).map(|i| (r[i], r[(i + 1) % r.len()])));
     let feet = edges.map(|(a, b)| nearest_on_segment(a, b, p));
     feet.min_by(|a, b| a.distance_squared(p).total_cmp(&b.distance_squared(p))).unwrap_or(p)
+}
+
+/// The middle of the part that comes nearest to `p`.
+fn middle_of_nearest(parts: &[Ring], p: DVec2) -> DVec2 {
+    let distance = |part: &Ring| nearest_in_parts(std::slice::from_ref(part), p).distance_squared(p);
+    let nearest = parts.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    nearest.map_or(p, |part| part.iter().sum::<DVec2>() / part.len() as f64)
 }
 
 /// The matrix that takes values at `samples` to the corners of the rectangle from `min` to `max`,

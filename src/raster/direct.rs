@@ -131,7 +131,8 @@ impl Shining<'_> {
     fn block(&self, (min, max): (DVec2, DVec2)) -> [DVec3; 4] {
         let reach = 0.25 * (self.texel[0].abs() + self.texel[1].abs());
         let least = DVec2::splat(self.light.tracer.margin());
-        let (min, max) = (min - reach.max(least), max + reach.max(least));
+        let (low, high) = self.surface.extent();
+        let (min, max) = ((min - reach).max(low) - least, (max + reach).min(high) + least);
         let frame: &Frame = &self.surface.frame;
         [min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)].map(|p| frame.lift(p))
     }

@@ -51,6 +51,8 @@ impl<'a> TriangleLocator<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::retriangulate::MeshVertex;
+    use glam::DVec2;
 
     /// A fan over a square whose light is linear in the position.
     fn linear_square() -> SurfaceMesh {

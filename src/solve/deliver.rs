@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::direct::DirectPass;
 use super::emitter::{Between, Effort, Evaluation, Precision};
-use super::form_factor::point_to_disk;
+use super::form_factor::{SurfacePoint, point_to_disk};
 use super::patches::Patches;
 use super::shooters::{Shooter, Shooters};
 use crate::element::{Element, Facet, NONE, Side};
@@ -25,7 +25,11 @@ use crate::options::Refine;
 const WEAK: f64 = 3e-4;
 
 /// The error in an element's middle that a delivery may leave, as a fraction of the light there.
-const TOLERANCE: f64 = 4e-4;
+const TOLERANCE: f64 = 6e-4;
+
+/// Where something stands between, this share of the difference between samples counts as error: the
+/// interpolation of a shadow's edge can be right in the middle by chance.
+const SHADOW_SHARE: f64 = 0.2;
 
 /// What delivering took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,7 +45,8 @@ pub struct DeliveryCounts {
 }
 
 impl DeliveryCounts {
-    fn add(&mut self, other: &Self) {
+    /// Adds another delivery's counts.
+    pub fn add(&mut self, other: &Self) {
         self.weak += other.weak;
         self.strong += other.strong;
         self.splits += other.splits;
@@ -49,9 +54,13 @@ impl DeliveryCounts {
     }
 }
 
-/// Delivers what all patches send to all facets.
-pub fn deliver(pass: &DirectPass, patches: &Patches, facets: &mut [Facet]) -> DeliveryCounts {
-    let shooters = Shooters::new(facets, patches);
+/// Delivers what all shooters send to all facets, in place of what was delivered before.
+pub fn deliver(
+    pass: &DirectPass,
+    patches: &Patches,
+    shooters: &Shooters,
+    facets: &mut [Facet],
+) -> DeliveryCounts {
     // Patches come in the order of facets, so each facet's are consecutive.
     let mut first_of_facet = vec![0; facets.len() + 1];
     for patch in &patches.patches {
@@ -65,9 +74,12 @@ pub fn deliver(pass: &DirectPass, patches: &Patches, facets: &mut [Facet]) -> De
         .par_iter_mut()
         .enumerate()
         .map(|(index, facet)| {
+            for element in &mut facet.elements {
+                element.indirect = [DVec3::ZERO; 4];
+            }
             let mut delivery = Delivery {
                 pass,
-                shooters: &shooters,
+                shooters,
                 values: vec![(NONE, DVec3::ZERO); facet.samples.len()],
                 facet,
                 typical,
@@ -162,15 +174,16 @@ impl Delivery<'_> {
         let centre = self.facet.centre(element);
         let to_shooter = s.centre - centre.position;
         let half = 0.5 * (e.max - e.min).length();
-        let gap = (to_shooter.length() - 0.5 * s.radius).max(0.25 * to_shooter.length());
+        let distance = to_shooter.length();
+        let gap = (distance - half - s.radius).max(0.15 * distance);
         let near = (half / gap).min(1.0);
-        let factor = if s.area < 0.02 * gap * gap {
+        let factor = if s.area < 0.01 * gap * gap {
             point_to_disk(centre, s.centre, s.normal, s.area)
         } else {
             emitter.form_factor(centre)
         };
-        let light = luminance(s.radiosity) * factor.max(s.area / (std::f64::consts::PI * gap * gap) * 0.1);
-        if s.spread * factor.max(0.05 * near) > TOLERANCE * self.reference && !s.is_leaf() {
+        let most = factor.max(s.most_factor(&hull, self.facet.frame.normal, gap));
+        if s.spread * factor > TOLERANCE * self.reference && !s.is_leaf() {
             for part in s.parts {
                 if part != NONE {
                     self.receive(element, part, Some(&between));
@@ -178,12 +191,12 @@ impl Delivery<'_> {
             }
             return;
         }
-        let mut change = near * near * 0.5;
-        if !between.is_empty() {
-            change = change.max(0.25 * near.max(0.3));
-        }
-        let wants_parts = light * change > TOLERANCE * self.reference;
-        if wants_parts && self.part(element) {
+        let change = if between.is_empty() { 0.5 * near * near } else { near.max(0.2) };
+        let allowed = TOLERANCE * self.reference;
+        if luminance(s.radiosity) * most * change > allowed
+            && self.error_in_middle(element, shooter, &between) > allowed
+            && self.part(element)
+        {
             for child in self.facet.elements[element as usize].children {
                 if child != NONE {
                     self.receive(child, shooter, Some(&between));
@@ -192,6 +205,21 @@ impl Delivery<'_> {
             return;
         }
         self.take(element, shooter, &between);
+    }
+
+    /// How far the interpolation of what arrives in the samples is from what arrives in the middle; where
+    /// something stands between, not less than a share of how much the samples differ.
+    fn error_in_middle(&mut self, element: u32, shooter: u32, between: &[u32]) -> f64 {
+        let samples = self.facet.elements[element as usize].samples;
+        let values = samples.map(|sample| self.value(sample, shooter, between));
+        let middle = self.evaluate(self.facet.centre(element), shooter, between);
+        let e = &self.facet.elements[element as usize];
+        let interpolated = e.interpolate(&e.corner_values(values), e.centroid);
+        let error = luminance((interpolated - middle).abs());
+        if between.is_empty() {
+            return error;
+        }
+        values.iter().map(|v| SHADOW_SHARE * luminance((*v - middle).abs())).fold(error, f64::max)
     }
 
     /// Whether the element has parts now.
@@ -228,12 +256,15 @@ impl Delivery<'_> {
         if known == shooter {
             return value;
         }
-        let s: &Shooter = &self.shooters.all[shooter as usize];
-        let point = self.facet.samples[sample as usize].point;
-        let between = if between.is_empty() { Between::Nothing } else { Between::Triangles(between) };
-        let value = s.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation);
+        let value = self.evaluate(self.facet.samples[sample as usize].point, shooter, between);
         self.values[sample as usize] = (shooter, value);
         value
+    }
+
+    fn evaluate(&mut self, point: SurfacePoint, shooter: u32, between: &[u32]) -> DVec3 {
+        let s: &Shooter = &self.shooters.all[shooter as usize];
+        let between = if between.is_empty() { Between::Nothing } else { Between::Triangles(between) };
+        s.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation)
     }
 }
 

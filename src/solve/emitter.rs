@@ -115,6 +115,12 @@ impl AreaEmitter {
         self.exitance * self.area
     }
 
+    /// The largest of its corners' products with `direction`.
+    #[must_use]
+    pub fn reach(&self, direction: DVec3) -> f64 {
+        self.hull.iter().map(|&p| direction.dot(p)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The form factor from `receiver` with nothing between, in `[0, 1]`.
     #[must_use]
     pub fn unoccluded(&self, receiver: SurfacePoint) -> f64 {
@@ -126,8 +132,12 @@ impl AreaEmitter {
 
     fn visible(&self, receiver: SurfacePoint, tracer: &Tracer, between: &[u32], e: &mut Evaluation) -> f64 {
         if between.len() <= e.precision.exact_occluders {
-            let parts =
-                ConvexParts { parts: &self.parts, normal: self.frame.normal, origin: self.frame.origin };
+            let parts = ConvexParts {
+                parts: &self.parts,
+                normal: self.frame.normal,
+                origin: self.frame.origin,
+                margin: tracer.margin() * 0.5,
+            };
             let occluders = between.iter().map(|&t| &tracer.triangles()[t as usize]);
             if let Some(f) = visible_form_factor(receiver, parts, occluders, &mut e.workspace) {
                 e.effort.exact += 1;

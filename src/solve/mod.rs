@@ -27,6 +27,7 @@ use deliver::{DeliveryCounts, deliver, spread_kept};
 use direct::{DirectPass, ShotCounts};
 use emitter::{AreaEmitter, Emitter};
 use patches::{Energy, Patches};
+use shooters::{Reflected, Shooters};
 use umbra::Occluders;
 
 /// What the solver works on.
@@ -113,9 +114,15 @@ pub fn solve(
     }
     shoot_patches(&mut patches, problem, progress)?;
     pass.typical = patches.mean_irradiance();
-    let delivery = deliver(&pass, &patches, &mut facets);
-    spread_kept(&patches, &mut facets, tracer.diagonal() * 1e-6);
-    progress(1.0);
+    let mut delivery = DeliveryCounts::default();
+    for (round, reflected) in [Reflected::ByPatch, Reflected::ByElement].into_iter().enumerate() {
+        let shooters = Shooters::new(&facets, &patches, reflected);
+        delivery.add(&deliver(&pass, &patches, &shooters, &mut facets));
+        spread_kept(&patches, &mut facets, tracer.diagonal() * 1e-6);
+        if !progress(0.85 + 0.15 * round as f64) {
+            return None;
+        }
+    }
     let emitters: Vec<Emitter> = glowing.into_iter().chain(lights).collect();
     Some(Solution {
         facets,
@@ -161,7 +168,7 @@ fn typical_irradiance(glowing: &[Emitter], lights: &[Emitter], facets: &[Facet],
 
 /// Direct irradiance of each patch as its elements have it.
 fn mean_direct(patches: &Patches, facets: &[Facet]) -> Vec<DVec3> {
-    patches.patches.iter().map(|p| facets[p.facet as usize].mean_direct(p.element)).collect()
+    patches.patches.iter().map(|p| facets[p.facet as usize].mean(p.element).0).collect()
 }
 
 /// Shots until the unshot power is small; `None` when told to stop.

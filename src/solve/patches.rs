@@ -19,8 +19,8 @@ use super::form_factor::{SurfacePoint, point_to_disk};
 use crate::element::{Element, Facet};
 use crate::trace::Tracer;
 
-/// Rays that tell what leaves the scene; 8 × 8 strata of the hemisphere.
-const HEMISPHERE_STRATA: u32 = 8;
+/// Rays that tell what leaves the scene: a square of strata of the hemisphere, this many a side.
+const HEMISPHERE_STRATA: u32 = 16;
 
 /// Beyond this many radii of the larger patch, centres stand for patches.
 const FAR: f64 = 6.0;
@@ -115,7 +115,7 @@ impl Patches {
         let rays = AtomicCount::default();
         patches.par_iter_mut().for_each(|p| {
             (p.escaping, p.onto_backs) = p.losses(tracer);
-            rays.add(4 * u64::from(HEMISPHERE_STRATA * HEMISPHERE_STRATA));
+            rays.add(u64::from(HEMISPHERE_STRATA * HEMISPHERE_STRATA));
         });
         let rows = (0..patches.len()).map(|_| None).collect();
         Self { patches, rows, energy: Energy::default(), shots: 0, rays: rays.get() }
@@ -263,8 +263,17 @@ impl Patch {
         let e: &Element = &facet.elements[element as usize];
         let parts = facet.parts(element);
         let centre = facet.centre(element);
-        // Gauss's points of a rectangle: 1/√3 of the way to its corners.
-        let points = e.samples.map(|s| centre.position.lerp(facet.samples[s as usize].point.position, 0.577));
+        // Gauss's points of a rectangle: 1/√3 of the way to its corners. A concave outline may leave the
+        // sample itself only.
+        let points = e.samples.map(|s| {
+            let sample = &facet.samples[s as usize];
+            let inner = e.centroid.lerp(sample.position, 0.577);
+            if facet.contains(element, inner) {
+                centre.position.lerp(sample.point.position, 0.577)
+            } else {
+                sample.point.position
+            }
+        });
         let radius = parts.iter().flatten().map(|p| p.distance(centre.position)).fold(0.0, f64::max);
         Self {
             facet: facet_index,
@@ -287,20 +296,20 @@ impl Patch {
     fn losses(&self, tracer: &Tracer) -> (f64, f64) {
         let frame = crate::geom::Frame::new(self.centre.position, self.centre.normal, DVec3::X);
         let (mut escaping, mut behind) = (0_u32, 0_u32);
-        for point in self.points {
-            for k in 0..HEMISPHERE_STRATA * HEMISPHERE_STRATA {
-                let u = (f64::from(k % HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
-                let v = (f64::from(k / HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
-                let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
-                let direction = v.sqrt() * (cos * frame.u + sin * frame.v) + (1.0 - v).sqrt() * frame.normal;
-                match tracer.closest_hit(point, direction) {
-                    None => escaping += 1,
-                    Some(hit) if hit.from_behind && !tracer.is_double_sided(hit.triangle) => behind += 1,
-                    Some(_) => {}
-                }
+        for k in 0..HEMISPHERE_STRATA * HEMISPHERE_STRATA {
+            let u = (f64::from(k % HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
+            let v = (f64::from(k / HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
+            let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
+            let direction = v.sqrt() * (cos * frame.u + sin * frame.v) + (1.0 - v).sqrt() * frame.normal;
+            // Neighbouring strata start from different points.
+            let point = self.points[((k + 2 * (k / HEMISPHERE_STRATA)) % 4) as usize];
+            match tracer.closest_hit(point, direction) {
+                None => escaping += 1,
+                Some(hit) if hit.from_behind && !tracer.is_double_sided(hit.triangle) => behind += 1,
+                Some(_) => {}
             }
         }
-        let all = f64::from(4 * HEMISPHERE_STRATA * HEMISPHERE_STRATA);
+        let all = f64::from(HEMISPHERE_STRATA * HEMISPHERE_STRATA);
         (f64::from(escaping) / all, f64::from(behind) / all)
     }
 }

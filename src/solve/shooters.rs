@@ -28,11 +28,39 @@ pub struct Shooter {
 }
 
 impl Shooter {
+    /// A bound, about, on the form factor from any point of a receiver with corners `hull` and normal `normal`
+    /// that comes no nearer than `gap` metres.
+    #[must_use]
+    pub fn most_factor(&self, hull: &[DVec3], normal: DVec3, gap: f64) -> f64 {
+        let Some(&origin) = hull.first() else { return 0.0 };
+        let highest = self.reach(normal) - normal.dot(origin);
+        let deepest = hull.iter().map(|&p| self.normal.dot(p - self.centre)).fold(0.0, f64::max);
+        let cosines = (highest / gap).clamp(0.0, 1.0) * (deepest / gap).min(1.0);
+        (cosines * self.area / (std::f64::consts::PI * gap * gap)).min(1.0)
+    }
+
+    /// How far it reaches along a direction.
+    fn reach(&self, direction: DVec3) -> f64 {
+        match &self.emitter {
+            Emitter::Area(area) => area.reach(direction),
+            Emitter::Punctual(_) => direction.dot(self.centre),
+        }
+    }
+
     /// Whether it has no parts.
     #[must_use]
     pub fn is_leaf(&self) -> bool {
         self.parts == [NONE; 4]
     }
+}
+
+/// Where a shooter's reflected light is taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reflected {
+    /// The patch's mean, the same for all of its parts.
+    ByPatch,
+    /// What each element received in an earlier delivery.
+    ByElement,
 }
 
 /// All shooters: a small tree for each patch.
@@ -44,20 +72,28 @@ pub struct Shooters {
 }
 
 impl Shooters {
-    /// Makes shooters of the patches and of the elements that direct light split them into.
+    /// Makes shooters of the patches and of the elements that they are split into.
     #[must_use]
-    pub fn new(facets: &[Facet], patches: &Patches) -> Self {
+    pub fn new(facets: &[Facet], patches: &Patches, reflected: Reflected) -> Self {
         let mut shooters = Self::default();
         for patch in &patches.patches {
             let facet = &facets[patch.facet as usize];
-            let mesh_direct = facet.mean_direct(patch.element);
+            let (mesh_direct, _) = facet.mean(patch.element);
             // The mesh's direct light, in proportion to what the energy balance made of it.
             let scale = DVec3::select(
                 mesh_direct.cmpgt(DVec3::ZERO),
                 patch.direct / mesh_direct.max(DVec3::splat(f64::MIN_POSITIVE)),
                 DVec3::ZERO,
             );
-            let root = shooters.add(facet, patch.element, scale, patch.indirect);
+            let light = |element| {
+                let (direct, indirect) = facet.mean(element);
+                let reflected = match reflected {
+                    Reflected::ByPatch => patch.indirect,
+                    Reflected::ByElement => indirect,
+                };
+                direct * scale + reflected
+            };
+            let root = shooters.add(facet, patch.element, &light);
             shooters.roots.push(root);
         }
         shooters
@@ -69,11 +105,10 @@ impl Shooters {
         self.roots[patch]
     }
 
-    fn add(&mut self, facet: &Facet, element: u32, scale: DVec3, indirect: DVec3) -> u32 {
+    fn add(&mut self, facet: &Facet, element: u32, light: &dyn Fn(u32) -> DVec3) -> u32 {
         let e = &facet.elements[element as usize];
         let index = self.all.len();
-        let direct = facet.mean_direct(element) * scale;
-        let radiosity = e.reflectance * (direct + indirect);
+        let radiosity = e.reflectance * light(element);
         let parts = facet.parts(element);
         let centre = facet.frame.lift(e.centroid);
         self.all.push(Shooter {
@@ -89,7 +124,7 @@ impl Shooters {
         let mut parts = [NONE; 4];
         let mut spread: f64 = 0.0;
         for (slot, child) in parts.iter_mut().zip(e.children()) {
-            let part = self.add(facet, child, scale, indirect);
+            let part = self.add(facet, child, light);
             let p = &self.all[part as usize];
             let luminance = |b: DVec3| b.dot(DVec3::new(0.2126, 0.7152, 0.0722));
             spread = spread.max(luminance((p.radiosity - radiosity).abs()) + p.spread);

@@ -41,6 +41,9 @@ pub struct ConvexParts<'a> {
     pub normal: DVec3,
     /// A point of the plane.
     pub origin: DVec3,
+    /// What comes no farther in front of the plane than this hides nothing, metres: the emitter's own
+    /// surroundings in its plane.
+    pub margin: f64,
 }
 
 /// The form factor from `receiver` to the visible part of `emitter`.
@@ -58,6 +61,7 @@ pub fn visible_form_factor<'t>(
     if plane_offset >= 0.0 {
         return Some(0.0); // behind the emitter
     }
+    let near_side = plane_offset + emitter.margin.min(-0.5 * plane_offset);
     workspace.parts.clear();
     for part in emitter.parts {
         let part = Part::new(part.iter().map(|&v| v - x))?.cut(receiver.normal, 0.0)?;
@@ -72,7 +76,7 @@ pub fn visible_form_factor<'t>(
         // What casts a shadow is above the horizon and on this side of the emitter's plane.
         let shade = Part::new(triangle.iter().map(|&v| v - x))?
             .cut(receiver.normal, 0.0)?
-            .cut(emitter.normal, plane_offset)?;
+            .cut(emitter.normal, near_side)?;
         if shade.count >= 3 {
             subtract(&shade, workspace)?;
         }
@@ -182,7 +186,7 @@ mod tests {
     }
 
     fn looking_up(parts: &[Vec<DVec3>]) -> ConvexParts<'_> {
-        ConvexParts { parts, normal: -DVec3::Z, origin: parts[0][0] }
+        ConvexParts { parts, normal: -DVec3::Z, origin: parts[0][0], margin: 1e-9 }
     }
 
     fn at(x: f64, y: f64) -> SurfacePoint {
@@ -263,6 +267,19 @@ mod tests {
                 visible_form_factor(at(0.0, 0.0), looking_up(&parts), occluders.iter(), &mut workspace);
             assert!((actual.unwrap() - whole).abs() < EXACT);
         }
+    }
+
+    /// The ceiling around a lamp that is let into it, up to rounding.
+    #[test]
+    fn what_lies_in_the_emitters_plane_hides_nothing() {
+        let parts = [ceiling(2.0, 1.0)];
+        let receiver = SurfacePoint { position: DVec3::new(3.0, 0.0, 1.9), normal: -DVec3::X };
+        let whole = point_to_polygon(receiver, &parts[0]);
+        let c = |x, y| DVec3::new(x, y, 2.0 - 1e-12);
+        let around = [[c(1.0, -3.0), c(3.0, 3.0), c(3.0, -3.0)], [c(1.0, -3.0), c(1.0, 3.0), c(3.0, 3.0)]];
+        let mut workspace = Workspace::default();
+        let seen = visible_form_factor(receiver, looking_up(&parts), around.iter(), &mut workspace);
+        assert!((seen.unwrap() - whole).abs() < EXACT && whole > 0.0);
     }
 
     /// A wall that passes through the emitter's plane shades on this side of it only.
