@@ -10,6 +10,7 @@ use glam::{DVec2, DVec3};
 
 use crate::geom::Frame;
 use crate::geom::polygon::contains;
+use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
 use crate::solve::umbra::Occluders;
@@ -21,6 +22,9 @@ const SMALL_BLOCK: usize = 8;
 
 /// Blocks of more texels than this are worked on side by side.
 const PARALLEL_BLOCK: usize = 4096;
+
+/// Light that changes by less than this fraction within a small block is taken once a texel.
+const SMOOTH: f64 = 0.15;
 
 /// Where in a texel light is evaluated when a shadow's edge crosses it, in texels from the middle.
 const SUPERSAMPLES: [(f64, f64); 4] = [(-0.25, -0.25), (0.25, -0.25), (0.25, 0.25), (-0.25, 0.25)];
@@ -102,7 +106,7 @@ impl Shining<'_> {
             return Effort::default();
         }
         if texels.len() <= SMALL_BLOCK {
-            return self.evaluate(texels, |this, t, e| this.supersampled(t, &between, e));
+            return self.shadow_edge(texels, &between);
         }
         let (min, max) = extent;
         let axis = usize::from(max.y - min.y > max.x - min.x);
@@ -113,7 +117,7 @@ impl Shining<'_> {
         if low.is_empty() || high.is_empty() {
             // All in one place along the longer axis: they cannot be told apart.
             let all = if low.is_empty() { high } else { low };
-            return self.evaluate(all, |this, t, e| this.supersampled(t, &between, e));
+            return self.shadow_edge(all, &between);
         }
         let (low_extent, high_extent) = (self::extent(low), self::extent(high));
         let work_low = |low| self.shine_on(low, low_extent, Some(&between));
@@ -142,9 +146,28 @@ impl Shining<'_> {
         texels: &mut [LitTexel],
         light: impl Fn(&Self, &LitTexel, &mut Evaluation) -> DVec3,
     ) -> Effort {
-        let mut evaluation = Evaluation::new(Precision::EMITTER);
+        let mut evaluation = Evaluation::new(Precision::TEXEL);
         for texel in texels {
             texel.direct += light(self, texel, &mut evaluation);
+        }
+        evaluation.effort
+    }
+
+    /// A small block in which shadow may fall: one point a texel where the light changes little from texel
+    /// to texel, several where it changes much.
+    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[u32]) -> Effort {
+        let mut evaluation = Evaluation::new(Precision::TEXEL);
+        let once: Vec<DVec3> = texels
+            .iter()
+            .map(|t| self.irradiance(t.point, Between::Triangles(between), &mut evaluation))
+            .collect();
+        let (least, most) = once.iter().map(|&e| luminance(e)).fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| {
+            (lo.min(e), hi.max(e))
+        });
+        let is_smooth = texels.len() > 1 && most - least <= SMOOTH * most;
+        for (texel, once) in texels.iter_mut().zip(once) {
+            let light = if is_smooth { once } else { self.supersampled(texel, between, &mut evaluation) };
+            texel.direct += light;
         }
         evaluation.effort
     }

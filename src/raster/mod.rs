@@ -16,13 +16,15 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::element::SurfaceAppearance;
+use crate::light::luminance;
 use crate::options::{BakeOptions, Direct, Quantity};
-use crate::retriangulate::RadiosityMesh;
+use crate::retriangulate::{RadiosityMesh, SurfaceMesh};
 use crate::solve::emitter::{Effort, Emitter};
 use crate::solve::umbra::Occluders;
-use crate::surface::Surface;
+use crate::surface::{Region, Surface};
 use crate::trace::Tracer;
 use crate::unwrap::Atlas;
+use buried::{Outlook, outlook};
 pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
 use direct::{DirectLight, LitTexel};
@@ -75,13 +77,7 @@ pub struct TexelCounts {
 /// Computes all texels of the page.
 #[must_use]
 pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
-    let buried: Vec<Vec<bool>> = input
-        .surfaces
-        .par_iter()
-        .map(|s| {
-            s.regions.iter().map(|r| s.regions.len() > 1 && buried::is_buried(s, r, input.tracer)).collect()
-        })
-        .collect();
+    let buried = buried_regions(input);
     let is_open = |surface: usize, region: usize| !buried[surface][region];
     let sites = sites(input.surfaces, input.atlas, &is_open);
     let mut of_surface: Vec<Vec<usize>> = vec![Vec::new(); input.surfaces.len()];
@@ -109,10 +105,43 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
             valid[at] = true;
         }
     }
+    tracing::debug!(?counts, "texels");
     let before = valid.iter().filter(|&&v| v).count();
     dilate(&mut texels, &mut valid, size, input.atlas.padding);
     counts.dilated = (valid.iter().filter(|&&v| v).count() - before) as u64;
     (Lightmap { width: size.0, height: size.1, texels }, counts)
+}
+
+/// A gap with less light than this fraction of the brightest region of its surface is dark.
+const DARK: f64 = 1e-2;
+
+/// For each surface's regions whether nobody sees them.
+fn buried_regions(input: &RasterInput) -> Vec<Vec<bool>> {
+    let brightest = |mesh: &SurfaceMesh, region: usize| {
+        let corners = mesh.triangles.iter().zip(&mesh.regions).filter(|(_, r)| **r as usize == region);
+        corners
+            .flat_map(|(t, _)| t.iter().map(|&v| &mesh.vertices[v as usize]))
+            .map(|v| luminance(v.direct + v.indirect))
+            .fold(0.0, f64::max)
+    };
+    input
+        .surfaces
+        .par_iter()
+        .zip(&input.mesh.surfaces)
+        .map(|(surface, mesh)| {
+            if surface.regions.len() < 2 {
+                return vec![false; surface.regions.len()];
+            }
+            let light: Vec<f64> = (0..surface.regions.len()).map(|r| brightest(mesh, r)).collect();
+            let most = light.iter().copied().fold(0.0, f64::max);
+            let is_buried = |(region, &light): (&Region, &f64)| match outlook(surface, region, input.tracer) {
+                Outlook::Open => false,
+                Outlook::Narrow => light < DARK * most,
+                Outlook::Backs => true,
+            };
+            surface.regions.iter().zip(&light).map(is_buried).collect()
+        })
+        .collect()
 }
 
 /// The finished values of one surface's texels, in `direct`.

@@ -24,6 +24,8 @@ pub struct Precision {
 impl Precision {
     /// For emitters: few, strong, and seen in every shadow's edge.
     pub const EMITTER: Self = Self { exact_occluders: 24, rays_a_side: 8 };
+    /// For emitters seen from several points of one texel.
+    pub const TEXEL: Self = Self { exact_occluders: 24, rays_a_side: 4 };
     /// For reflectors: many, each weak.
     pub const REFLECTOR: Self = Self { exact_occluders: 4, rays_a_side: 3 };
 }

@@ -16,7 +16,7 @@ use super::form_factor::{SurfacePoint, signed_point_to_polygon};
 
 /// Corners that a convex part may have after cutting; more than this many cuts at one
 /// part's edges do not occur with the few occluders that are subtracted exactly.
-const MOST_CORNERS: usize = 16;
+const MOST_CORNERS: usize = 12;
 
 /// A convex polygon of few corners, relative to the receiving point.
 #[derive(Clone, Copy)]
@@ -63,10 +63,12 @@ pub fn visible_form_factor<'t>(
     }
     let near_side = plane_offset + emitter.margin.min(-0.5 * plane_offset);
     workspace.parts.clear();
+    let (mut whole, mut above, mut shade) = (Part::EMPTY, Part::EMPTY, Part::EMPTY);
     for part in emitter.parts {
-        let part = Part::new(part.iter().map(|&v| v - x))?.cut(receiver.normal, 0.0)?;
-        if part.count >= 3 {
-            workspace.parts.push(part);
+        whole.fill(part.iter().map(|&v| v - x))?;
+        whole.cut(receiver.normal, 0.0, &mut above)?;
+        if above.count >= 3 {
+            workspace.parts.push(above);
         }
     }
     for triangle in occluders {
@@ -74,26 +76,29 @@ pub fn visible_form_factor<'t>(
             return Some(0.0);
         }
         // What casts a shadow is above the horizon and on this side of the emitter's plane.
-        let shade = Part::new(triangle.iter().map(|&v| v - x))?
-            .cut(receiver.normal, 0.0)?
-            .cut(emitter.normal, near_side)?;
+        whole.fill(triangle.iter().map(|&v| v - x))?;
+        whole.cut(receiver.normal, 0.0, &mut above)?;
+        above.cut(emitter.normal, near_side, &mut shade)?;
         if shade.count >= 3 {
             subtract(&shade, workspace)?;
         }
     }
     let seen_from_x = SurfacePoint { position: DVec3::ZERO, normal: receiver.normal };
     let sum: f64 =
-        workspace.parts.iter().map(|p| signed_point_to_polygon(seen_from_x, &p.corners[..p.count])).sum();
+        workspace.parts.iter().map(|p| signed_point_to_polygon(seen_from_x, p.corners())).sum();
     Some(sum.clamp(0.0, 1.0))
 }
 
 /// Removes from all parts what lies in the pyramid over `shade` with its tip in the origin.
 fn subtract(shade: &Part, workspace: &mut Workspace) -> Option<()> {
+    let inner = shade.corners().iter().sum::<DVec3>();
+    if is_flat(shade, inner) {
+        return Some(()); // the point lies in the occluder's plane, so it covers no angle
+    }
     let mut sides = [DVec3::ZERO; MOST_CORNERS];
-    let inner = shade.corners[..shade.count].iter().sum::<DVec3>();
     let mut count = 0;
-    for i in 0..shade.count {
-        let side = shade.corners[i].cross(shade.corners[(i + 1) % shade.count]);
+    for (i, a) in shade.corners().iter().enumerate() {
+        let side = a.cross(shade.corners[if i + 1 == shade.count { 0 } else { i + 1 }]);
         // A side seen edge-on, or an edge too short to matter, bounds nothing.
         if side.length_squared() > 0.0 {
             sides[count] = if side.dot(inner) >= 0.0 { side } else { -side };
@@ -101,22 +106,25 @@ fn subtract(shade: &Part, workspace: &mut Workspace) -> Option<()> {
         }
     }
     let sides = &sides[..count];
-    if is_flat(shade, inner) {
-        return Some(()); // the point lies in the occluder's plane, so it covers no angle
-    }
     workspace.next.clear();
+    let (mut rest, mut inside) = (Part::EMPTY, Part::EMPTY);
     for part in &workspace.parts {
         if sides.iter().any(|&s| part.is_outside(s)) {
             workspace.next.push(*part);
             continue;
         }
-        let mut rest = *part;
+        rest.copy_from(part);
         for &side in sides {
-            let outside = rest.cut(-side, 0.0)?;
+            if rest.is_inside(side) {
+                continue;
+            }
+            let mut outside = Part::EMPTY;
+            rest.cut(-side, 0.0, &mut outside)?;
             if outside.count >= 3 {
                 workspace.next.push(outside);
             }
-            rest = rest.cut(side, 0.0)?;
+            rest.cut(side, 0.0, &mut inside)?;
+            rest.copy_from(&inside);
             if rest.count < 3 {
                 break;
             }
@@ -133,41 +141,53 @@ fn is_flat(shade: &Part, inner: DVec3) -> bool {
 }
 
 impl Part {
-    fn new(corners: impl Iterator<Item = DVec3>) -> Option<Self> {
-        let mut part = Self { corners: [DVec3::ZERO; MOST_CORNERS], count: 0 };
-        for corner in corners {
-            *part.corners.get_mut(part.count)? = corner;
-            part.count += 1;
-        }
-        Some(part)
+    const EMPTY: Self = Self { corners: [DVec3::ZERO; MOST_CORNERS], count: 0 };
+
+    /// Takes on these corners; `None` where they are too many.
+    fn fill(&mut self, corners: impl Iterator<Item = DVec3>) -> Option<()> {
+        self.count = 0;
+        corners.into_iter().try_for_each(|corner| self.push(corner))
+    }
+
+    fn push(&mut self, corner: DVec3) -> Option<()> {
+        *self.corners.get_mut(self.count)? = corner;
+        self.count += 1;
+        Some(())
+    }
+
+    fn copy_from(&mut self, other: &Self) {
+        self.corners[..other.count].copy_from_slice(other.corners());
+        self.count = other.count;
+    }
+
+    fn corners(&self) -> &[DVec3] {
+        &self.corners[..self.count]
     }
 
     fn is_outside(&self, side: DVec3) -> bool {
-        self.corners[..self.count].iter().all(|c| c.dot(side) <= 0.0)
+        self.corners().iter().all(|c| c.dot(side) <= 0.0)
     }
 
-    /// The part of this polygon where `normal · p ≥ offset`.
-    fn cut(&self, normal: DVec3, offset: f64) -> Option<Self> {
-        let corners = &self.corners[..self.count];
-        if corners.iter().all(|c| normal.dot(*c) >= offset) {
-            return Some(*self);
-        }
-        let mut out = Self { corners: [DVec3::ZERO; MOST_CORNERS], count: 0 };
-        let Some(&last) = corners.last() else { return Some(out) };
+    fn is_inside(&self, side: DVec3) -> bool {
+        self.corners().iter().all(|c| c.dot(side) >= 0.0)
+    }
+
+    /// Puts the part of this polygon where `normal · p ≥ offset` into `out`; `None` where it has too many corners.
+    fn cut(&self, normal: DVec3, offset: f64, out: &mut Self) -> Option<()> {
+        out.count = 0;
+        let Some(&last) = self.corners().last() else { return Some(()) };
         let (mut a, mut height_a) = (last, normal.dot(last) - offset);
-        for &b in corners {
+        for &b in self.corners() {
             let height_b = normal.dot(b) - offset;
             if (height_a >= 0.0) != (height_b >= 0.0) {
-                *out.corners.get_mut(out.count)? = a.lerp(b, height_a / (height_a - height_b));
-                out.count += 1;
+                out.push(a.lerp(b, height_a / (height_a - height_b)))?;
             }
             if height_b >= 0.0 {
-                *out.corners.get_mut(out.count)? = b;
-                out.count += 1;
+                out.push(b)?;
             }
             (a, height_a) = (b, height_b);
         }
-        Some(out)
+        Some(())
     }
 }
 
