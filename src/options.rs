@@ -121,7 +121,7 @@ pub struct BakeOptions {
     /// Whether elements wholly in one occluder's umbra are left whole. Default: yes.
     pub umbra_test: Toggle,
     /// The solver stops when the unshot power falls below this fraction of the emitted power, `(0, 1)`.
-    /// Default: 0.0001.
+    /// Default: 0.001.
     pub unshot_fraction: f64,
     /// Reflectances are clamped to this, `[0, 1)`: nothing may reflect all light for ever. Default: 0.95.
     pub max_reflectance: f64,
@@ -156,7 +156,7 @@ impl Default for BakeOptions {
             illumination_threshold: 0.3,
             shaft_test: Toggle::On,
             umbra_test: Toggle::On,
-            unshot_fraction: 1e-4,
+            unshot_fraction: 1e-3,
             max_reflectance: 0.95,
             padding: None,
             scene: None,

@@ -106,7 +106,7 @@ impl Shining<'_> {
             return Effort::default();
         }
         if texels.len() <= SMALL_BLOCK {
-            return self.shadow_edge(texels, &between);
+            return self.shadow_edge(texels, &self.light.occluders.polygons(tracer, &between));
         }
         let (min, max) = extent;
         let axis = usize::from(max.y - min.y > max.x - min.x);
@@ -117,7 +117,7 @@ impl Shining<'_> {
         if low.is_empty() || high.is_empty() {
             // All in one place along the longer axis: they cannot be told apart.
             let all = if low.is_empty() { high } else { low };
-            return self.shadow_edge(all, &between);
+            return self.shadow_edge(all, &self.light.occluders.polygons(tracer, &between));
         }
         let (low_extent, high_extent) = (self::extent(low), self::extent(high));
         let work_low = |low| self.shine_on(low, low_extent, Some(&between));
@@ -155,15 +155,16 @@ impl Shining<'_> {
 
     /// A small block in which shadow may fall: one point a texel where the light changes little from texel
     /// to texel, several where it changes much.
-    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[u32]) -> Effort {
+    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[&[DVec3]]) -> Effort {
         let mut evaluation = Evaluation::new(Precision::TEXEL);
         let once: Vec<DVec3> = texels
             .iter()
-            .map(|t| self.irradiance(t.point, Between::Triangles(between), &mut evaluation))
+            .map(|t| self.irradiance(t.point, Between::Polygons(between), &mut evaluation))
             .collect();
-        let (least, most) = once.iter().map(|&e| luminance(e)).fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| {
-            (lo.min(e), hi.max(e))
-        });
+        let (least, most) = once
+            .iter()
+            .map(|&e| luminance(e))
+            .fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| (lo.min(e), hi.max(e)));
         let is_smooth = texels.len() > 1 && most - least <= SMOOTH * most;
         for (texel, once) in texels.iter_mut().zip(once) {
             let light = if is_smooth { once } else { self.supersampled(texel, between, &mut evaluation) };
@@ -180,18 +181,18 @@ impl Shining<'_> {
     }
 
     /// The mean over points of the texel that lie in its region; the texel's own point where none does.
-    fn supersampled(&self, texel: &LitTexel, between: &[u32], evaluation: &mut Evaluation) -> DVec3 {
+    fn supersampled(&self, texel: &LitTexel, between: &[&[DVec3]], evaluation: &mut Evaluation) -> DVec3 {
         let rings = self.surface.regions.get(texel.region as usize).map_or(&[][..], |r| &r.rings);
         let (mut sum, mut count) = (DVec3::ZERO, 0);
         for (x, y) in SUPERSAMPLES {
             let point = texel.point + x * self.texel[0] + y * self.texel[1];
             if contains(rings, point) {
-                sum += self.irradiance(point, Between::Triangles(between), evaluation);
+                sum += self.irradiance(point, Between::Polygons(between), evaluation);
                 count += 1;
             }
         }
         if count == 0 {
-            return self.irradiance(texel.point, Between::Triangles(between), evaluation);
+            return self.irradiance(texel.point, Between::Polygons(between), evaluation);
         }
         sum / f64::from(count)
     }

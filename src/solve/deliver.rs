@@ -16,16 +16,19 @@ use super::direct::DirectPass;
 use super::emitter::{Between, Effort, Evaluation, Precision};
 use super::form_factor::{SurfacePoint, point_to_disk};
 use super::patches::Patches;
-use super::shooters::{Shooter, Shooters};
+use super::shooters::{Reflected, Shooter, Shooters};
 use crate::element::{Element, Facet, NONE, Side};
 use crate::light::luminance;
 use crate::options::Refine;
 
 /// A delivery whose change across the receiving patch is below this fraction of the light there is weak.
-const WEAK: f64 = 3e-4;
+const WEAK: f64 = 6e-4;
 
 /// The error in an element's middle that a delivery may leave, as a fraction of the light there.
-const TOLERANCE: f64 = 6e-4;
+const TOLERANCE: f64 = 1.2e-3;
+
+/// The same for a first delivery, which only shows the second how light varies over the shooters.
+const FIRST_TOLERANCE: f64 = 5e-3;
 
 /// Where something stands between, this share of the difference between samples counts as error: the
 /// interpolation of a shadow's edge can be right in the middle by chance.
@@ -61,6 +64,10 @@ pub fn deliver(
     shooters: &Shooters,
     facets: &mut [Facet],
 ) -> DeliveryCounts {
+    let tolerance = match shooters.reflected() {
+        Reflected::ByPatch => FIRST_TOLERANCE,
+        Reflected::ByElement => TOLERANCE,
+    };
     // Patches come in the order of facets, so each facet's are consecutive.
     let mut first_of_facet = vec![0; facets.len() + 1];
     for patch in &patches.patches {
@@ -83,6 +90,7 @@ pub fn deliver(
                 values: vec![(NONE, DVec3::ZERO); facet.samples.len()],
                 facet,
                 typical,
+                tolerance,
                 reference: typical,
                 evaluation: Evaluation::new(Precision::REFLECTOR),
                 counts: DeliveryCounts::default(),
@@ -104,6 +112,7 @@ struct Delivery<'a> {
     /// The last shooter asked in each sample, and its irradiance there.
     values: Vec<(u32, DVec3)>,
     typical: f64,
+    tolerance: f64,
     /// What errors are measured by in the present patch.
     reference: f64,
     evaluation: Evaluation,
@@ -133,7 +142,9 @@ impl Delivery<'_> {
                 let distance = d.length();
                 let most = (patch.area / (std::f64::consts::PI * distance * distance)).min(1.0).max(known);
                 let change = (2.0 * to.radius / distance).min(1.0);
-                if luminance(shooter.radiosity) * most * change < WEAK * self.reference {
+                if to.radius <= self.pass.indirect_threshold
+                    || luminance(shooter.radiosity) * most * change < WEAK * self.reference
+                {
                     *kept += shooter.radiosity * known;
                     self.counts.weak += 1;
                 } else {
@@ -183,7 +194,7 @@ impl Delivery<'_> {
             emitter.form_factor(centre)
         };
         let most = factor.max(s.most_factor(&hull, self.facet.frame.normal, gap));
-        if s.spread * factor > TOLERANCE * self.reference && !s.is_leaf() {
+        if s.spread * factor > self.tolerance * self.reference && !s.is_leaf() {
             for part in s.parts {
                 if part != NONE {
                     self.receive(element, part, Some(&between));
@@ -192,7 +203,7 @@ impl Delivery<'_> {
             return;
         }
         let change = if between.is_empty() { 0.5 * near * near } else { near.max(0.2) };
-        let allowed = TOLERANCE * self.reference;
+        let allowed = self.tolerance * self.reference;
         if luminance(s.radiosity) * most * change > allowed
             && self.error_in_middle(element, shooter, &between) > allowed
             && self.part(element)
@@ -263,7 +274,8 @@ impl Delivery<'_> {
 
     fn evaluate(&mut self, point: SurfacePoint, shooter: u32, between: &[u32]) -> DVec3 {
         let s: &Shooter = &self.shooters.all[shooter as usize];
-        let between = if between.is_empty() { Between::Nothing } else { Between::Triangles(between) };
+        let polygons = self.pass.occluders.polygons(self.pass.tracer, between);
+        let between = if polygons.is_empty() { Between::Nothing } else { Between::Polygons(&polygons) };
         s.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation)
     }
 }

@@ -283,7 +283,8 @@ impl<'a> Receiving<'a> {
     }
 
     fn evaluate(&mut self, point: super::form_factor::SurfacePoint, between: &[u32]) -> DVec3 {
-        let between = if between.is_empty() { Between::Nothing } else { Between::Triangles(between) };
+        let polygons = self.pass.occluders.polygons(self.pass.tracer, between);
+        let between = if polygons.is_empty() { Between::Nothing } else { Between::Polygons(&polygons) };
         self.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation)
     }
 }

@@ -23,9 +23,9 @@ pub struct Precision {
 
 impl Precision {
     /// For emitters: few, strong, and seen in every shadow's edge.
-    pub const EMITTER: Self = Self { exact_occluders: 24, rays_a_side: 8 };
+    pub const EMITTER: Self = Self { exact_occluders: 32, rays_a_side: 8 };
     /// For emitters seen from several points of one texel.
-    pub const TEXEL: Self = Self { exact_occluders: 24, rays_a_side: 4 };
+    pub const TEXEL: Self = Self { exact_occluders: 32, rays_a_side: 4 };
     /// For reflectors: many, each weak.
     pub const REFLECTOR: Self = Self { exact_occluders: 4, rays_a_side: 3 };
 }
@@ -57,8 +57,8 @@ pub enum Emitter {
 pub enum Between<'a> {
     /// Nothing: the shaft is empty.
     Nothing,
-    /// These triangles at most.
-    Triangles(&'a [u32]),
+    /// These convex polygons at most.
+    Polygons(&'a [&'a [DVec3]]),
 }
 
 /// How much was evaluated which way.
@@ -132,7 +132,13 @@ impl AreaEmitter {
         self.parts.iter().map(|p| signed_point_to_polygon(receiver, p)).sum::<f64>().clamp(0.0, 1.0)
     }
 
-    fn visible(&self, receiver: SurfacePoint, tracer: &Tracer, between: &[u32], e: &mut Evaluation) -> f64 {
+    fn visible(
+        &self,
+        receiver: SurfacePoint,
+        tracer: &Tracer,
+        between: &[&[DVec3]],
+        e: &mut Evaluation,
+    ) -> f64 {
         if between.len() <= e.precision.exact_occluders {
             let parts = ConvexParts {
                 parts: &self.parts,
@@ -140,7 +146,7 @@ impl AreaEmitter {
                 origin: self.frame.origin,
                 margin: tracer.margin() * 0.5,
             };
-            let occluders = between.iter().map(|&t| &tracer.triangles()[t as usize]);
+            let occluders = between.iter().copied();
             if let Some(f) = visible_form_factor(receiver, parts, occluders, &mut e.workspace) {
                 e.effort.exact += 1;
                 return f;
@@ -219,13 +225,13 @@ impl Emitter {
                 evaluation.effort.unoccluded += 1;
                 area.exitance * area.unoccluded(receiver)
             }
-            (Self::Area(area), Between::Triangles(triangles)) => {
-                area.exitance * area.visible(receiver, tracer, triangles, evaluation)
+            (Self::Area(area), Between::Polygons(polygons)) => {
+                area.exitance * area.visible(receiver, tracer, polygons, evaluation)
             }
             (Self::Punctual(light), between) => {
                 let irradiance = punctual_irradiance(light, receiver);
                 match between {
-                    Between::Triangles(_) if irradiance != DVec3::ZERO => {
+                    Between::Polygons(_) if irradiance != DVec3::ZERO => {
                         evaluation.effort.by_rays += 1;
                         evaluation.effort.rays += 1;
                         let to = self.toward(receiver.position, tracer.diagonal());
@@ -395,7 +401,7 @@ mod tests {
         let lamp = lamp();
         let mut e = Evaluation::new(Precision::EMITTER);
         for x in [-0.6, 0.0, 0.3, 0.6] {
-            let exact = lamp.visible(floor_point(x), &tracer, &[0], &mut e);
+            let exact = lamp.visible(floor_point(x), &tracer, &[&blocker], &mut e);
             let rays =
                 lamp.unoccluded(floor_point(x)) * lamp.fraction_by_rays(floor_point(x), &tracer, &mut e);
             // 64 rays resolve the edge to an eighth of the lamp's side.

@@ -105,6 +105,7 @@ pub fn solve(
             return None;
         }
     }
+    tracing::debug!(?direct, "direct light");
     let after = mean_direct(&patches, &facets);
     if lights.is_empty() {
         patches.receive_from_surfaces(&facets, &after);
@@ -113,11 +114,13 @@ pub fn solve(
         patches.receive_from_lights(&received);
     }
     shoot_patches(&mut patches, problem, progress)?;
+    tracing::debug!(shots = patches.shots, rays = patches.rays, patches = patches.patches.len(), "patches");
     pass.typical = patches.mean_irradiance();
     let mut delivery = DeliveryCounts::default();
     for (round, reflected) in [Reflected::ByPatch, Reflected::ByElement].into_iter().enumerate() {
         let shooters = Shooters::new(&facets, &patches, reflected);
         delivery.add(&deliver(&pass, &patches, &shooters, &mut facets));
+        tracing::debug!(?delivery, "delivered");
         spread_kept(&patches, &mut facets, tracer.diagonal() * 1e-6);
         if !progress(0.85 + 0.15 * round as f64) {
             return None;

@@ -64,18 +64,19 @@ pub enum Reflected {
 }
 
 /// All shooters: a small tree for each patch.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Shooters {
     /// Parts come after the whole.
     pub all: Vec<Shooter>,
     roots: Vec<u32>,
+    reflected: Reflected,
 }
 
 impl Shooters {
     /// Makes shooters of the patches and of the elements that they are split into.
     #[must_use]
     pub fn new(facets: &[Facet], patches: &Patches, reflected: Reflected) -> Self {
-        let mut shooters = Self::default();
+        let mut shooters = Self { all: Vec::new(), roots: Vec::new(), reflected };
         for patch in &patches.patches {
             let facet = &facets[patch.facet as usize];
             let (mesh_direct, _) = facet.mean(patch.element);
@@ -97,6 +98,12 @@ impl Shooters {
             shooters.roots.push(root);
         }
         shooters
+    }
+
+    /// Where their reflected light was taken from.
+    #[must_use]
+    pub fn reflected(&self) -> Reflected {
+        self.reflected
     }
 
     /// The shooter that is the patch with this index.

@@ -19,6 +19,9 @@ pub struct Occluders {
     outlines: Vec<Option<Vec<DVec3>>>,
 }
 
+/// Outlines with more corners occlude as triangles.
+const MOST_OUTLINE_CORNERS: usize = 6;
+
 const NO_SURFACE: u32 = u32::MAX;
 
 /// This many occluders are tried; an umbra's occluder is large and among the first.
@@ -44,6 +47,28 @@ impl Occluders {
             });
         }
         Self { surface_of_triangle, outlines }
+    }
+
+    /// The triangles `between` as convex polygons: a convex surface stands for all of its triangles.
+    ///
+    /// `between` ascends, so a surface's triangles come one after the other, or nearly.
+    #[must_use]
+    pub fn polygons<'a>(&'a self, tracer: &'a Tracer, between: &[u32]) -> Vec<&'a [DVec3]> {
+        let mut polygons: Vec<&[DVec3]> = Vec::with_capacity(between.len());
+        let mut taken: Vec<u32> = Vec::new();
+        for &t in between {
+            let surface = self.surface_of_triangle[t as usize];
+            match self.outlines.get(surface as usize).and_then(Option::as_deref) {
+                Some(outline) if outline.len() <= MOST_OUTLINE_CORNERS => {
+                    if !taken.contains(&surface) {
+                        taken.push(surface);
+                        polygons.push(outline);
+                    }
+                }
+                _ => polygons.push(&tracer.triangles()[t as usize]),
+            }
+        }
+        polygons
     }
 
     /// Whether some one of the triangles `between`, or the convex surface it belongs to, hides all of

@@ -1,6 +1,6 @@
 //! How much of an emitter a point sees, exactly.
 //!
-//! Each occluding triangle is cut to what lies between the point and the emitter's
+//! Each occluding convex polygon is cut to what lies between the point and the emitter's
 //! plane; what remains is a convex polygon whose shadow pyramid, with its tip in the
 //! point, is subtracted from the emitter's convex parts. What is left of the emitter
 //! is a set of convex polygons, and Lambert's closed form is summed over them: penumbrae
@@ -48,12 +48,12 @@ pub struct ConvexParts<'a> {
 
 /// The form factor from `receiver` to the visible part of `emitter`.
 ///
-/// `occluders` must hold every triangle that reaches into the space between the two;
+/// `occluders`, convex polygons, must hold everything that reaches into the space between the two;
 /// more do no harm. `None` when the cutting got out of hand: count rays instead.
 pub fn visible_form_factor<'t>(
     receiver: SurfacePoint,
     emitter: ConvexParts,
-    occluders: impl Iterator<Item = &'t [DVec3; 3]>,
+    occluders: impl Iterator<Item = &'t [DVec3]>,
     workspace: &mut Workspace,
 ) -> Option<f64> {
     let x = receiver.position;
@@ -71,12 +71,12 @@ pub fn visible_form_factor<'t>(
             workspace.parts.push(above);
         }
     }
-    for triangle in occluders {
+    for occluder in occluders {
         if workspace.parts.is_empty() {
             return Some(0.0);
         }
         // What casts a shadow is above the horizon and on this side of the emitter's plane.
-        whole.fill(triangle.iter().map(|&v| v - x))?;
+        whole.fill(occluder.iter().map(|&v| v - x))?;
         whole.cut(receiver.normal, 0.0, &mut above)?;
         above.cut(emitter.normal, near_side, &mut shade)?;
         if shade.count >= 3 {
@@ -84,8 +84,7 @@ pub fn visible_form_factor<'t>(
         }
     }
     let seen_from_x = SurfacePoint { position: DVec3::ZERO, normal: receiver.normal };
-    let sum: f64 =
-        workspace.parts.iter().map(|p| signed_point_to_polygon(seen_from_x, p.corners())).sum();
+    let sum: f64 = workspace.parts.iter().map(|p| signed_point_to_polygon(seen_from_x, p.corners())).sum();
     Some(sum.clamp(0.0, 1.0))
 }
 
@@ -209,6 +208,10 @@ mod tests {
         ConvexParts { parts, normal: -DVec3::Z, origin: parts[0][0], margin: 1e-9 }
     }
 
+    fn polygons(triangles: &[[DVec3; 3]]) -> impl Iterator<Item = &[DVec3]> {
+        triangles.iter().map(<[DVec3; 3]>::as_slice)
+    }
+
     fn at(x: f64, y: f64) -> SurfacePoint {
         SurfacePoint { position: DVec3::new(x, y, 0.0), normal: DVec3::Z }
     }
@@ -227,7 +230,8 @@ mod tests {
         for (x, y) in [(0.0, 0.0), (0.4, 0.1), (0.9, -0.7), (2.5, 0.0)] {
             let receiver = at(x, y);
             let actual =
-                visible_form_factor(receiver, looking_up(&parts), blocker.iter(), &mut workspace).unwrap();
+                visible_form_factor(receiver, looking_up(&parts), polygons(&blocker), &mut workspace)
+                    .unwrap();
             // The shadow of the blocker on the ceiling's plane, intersected with the ceiling.
             let (low_x, high_x) = ((2.0 * -0.3 - x).max(-1.0), (2.0 * 0.3 - x).min(1.0));
             let (low_y, high_y) = ((2.0 * -0.3 - y).max(-1.0), (2.0 * 0.3 - y).min(1.0));
@@ -261,7 +265,8 @@ mod tests {
         for (x, y) in [(0.0, 0.0), (0.8, 0.3), (-0.5, -0.9)] {
             let receiver = at(x, y);
             let exact =
-                visible_form_factor(receiver, looking_up(&parts), occluders.iter(), &mut workspace).unwrap();
+                visible_form_factor(receiver, looking_up(&parts), polygons(&occluders), &mut workspace)
+                    .unwrap();
             let (mut sum, cells) = (0.0, 300);
             for k in 0..cells * cells {
                 let cell = |i: i32| (f64::from(i) + 0.5) / f64::from(cells) * 2.0 - 1.0;
@@ -284,7 +289,7 @@ mod tests {
         for z in [2.5, -0.5] {
             let occluders = as_triangles(&ceiling(z, 3.0));
             let actual =
-                visible_form_factor(at(0.0, 0.0), looking_up(&parts), occluders.iter(), &mut workspace);
+                visible_form_factor(at(0.0, 0.0), looking_up(&parts), polygons(&occluders), &mut workspace);
             assert!((actual.unwrap() - whole).abs() < EXACT);
         }
     }
@@ -298,7 +303,7 @@ mod tests {
         let c = |x, y| DVec3::new(x, y, 2.0 - 1e-12);
         let around = [[c(1.0, -3.0), c(3.0, 3.0), c(3.0, -3.0)], [c(1.0, -3.0), c(1.0, 3.0), c(3.0, 3.0)]];
         let mut workspace = Workspace::default();
-        let seen = visible_form_factor(receiver, looking_up(&parts), around.iter(), &mut workspace);
+        let seen = visible_form_factor(receiver, looking_up(&parts), polygons(&around), &mut workspace);
         assert!((seen.unwrap() - whole).abs() < EXACT && whole > 0.0);
     }
 
@@ -308,10 +313,10 @@ mod tests {
         let parts = [ceiling(2.0, 1.0)];
         let wall = [DVec3::new(0.0, -9.0, 1.0), DVec3::new(0.0, 9.0, 1.0), DVec3::new(0.0, 0.0, 40.0)];
         let mut workspace = Workspace::default();
-        let seen = visible_form_factor(at(-0.5, 0.0), looking_up(&parts), [wall].iter(), &mut workspace);
+        let seen = visible_form_factor(at(-0.5, 0.0), looking_up(&parts), polygons(&[wall]), &mut workspace);
         let c = |x, y| DVec3::new(x, y, 2.0);
         let left = point_to_polygon(at(-0.5, 0.0), &[c(-1.0, -1.0), c(-1.0, 1.0), c(0.0, 1.0), c(0.0, -1.0)]);
-        let low = visible_form_factor(at(-0.5, 0.0), looking_up(&parts), [].iter(), &mut workspace);
+        let low = visible_form_factor(at(-0.5, 0.0), looking_up(&parts), polygons(&[]), &mut workspace);
         assert!(seen.unwrap() >= left - EXACT && seen.unwrap() < low.unwrap() - 0.01);
     }
 }
