@@ -194,7 +194,7 @@ impl Scale {
             Direct::Mesh => texel,
             Direct::Texel => TEXELS_AN_ELEMENT * texel,
         });
-        let indirect_threshold = options.subdivision_threshold.unwrap_or(1.5 * texel);
+        let indirect_threshold = options.subdivision_threshold.unwrap_or(texel);
         Self { patch_size: patch_size.max(threshold), threshold, indirect_threshold }
     }
 }

@@ -4,9 +4,15 @@
 //! stands in the shaft between them is handed down from the larger block and filtered. An
 //! empty shaft means closed form for all of the block's texels; one occluder that hides
 //! everything, zero; only small blocks that a shadow's edge crosses ask for visibility,
-//! and those take several points a texel.
+//! and those take several points a texel, which the texels are then fitted to.
 
-use glam::{DVec2, DVec3};
+use std::collections::HashSet;
+
+use glam::{DAffine2, DVec2, DVec3};
+
+use super::cover::{Cover, Covering, neighbours, take_after_neighbours};
+use super::coverage::TexelSite;
+use super::fit::{FitTexel, LightSample, fit};
 
 use crate::geom::Frame;
 use crate::geom::polygon::contains;
@@ -16,6 +22,7 @@ use crate::solve::form_factor::SurfacePoint;
 use crate::solve::umbra::Occluders;
 use crate::surface::Surface;
 use crate::trace::Tracer;
+use crate::unwrap::Chart;
 
 /// Blocks of no more texels than this are not halved further.
 const SMALL_BLOCK: usize = 8;
@@ -26,20 +33,47 @@ const PARALLEL_BLOCK: usize = 4096;
 /// Light that changes by less than this fraction within a small block is taken once a texel.
 const SMOOTH: f64 = 0.15;
 
-/// Where in a texel light is evaluated when a shadow's edge crosses it, in texels from the middle.
-const SUPERSAMPLES: [(f64, f64); 4] = [(-0.25, -0.25), (0.25, -0.25), (0.25, 0.25), (-0.25, 0.25)];
+/// Where a shadow's edge crosses a texel, light is evaluated at this many points a side of it.
+const POINTS_A_SIDE: u32 = 3;
 
 /// A texel that receives direct light.
 #[derive(Clone, Copy, Debug)]
 pub struct LitTexel {
     /// Its index among the sites.
     pub site: usize,
+    /// Column and row.
+    pub cell: [u32; 2],
     /// Region of the surface.
     pub region: u32,
     /// Where it is evaluated, plane coordinates.
     pub point: DVec2,
     /// What arrives.
     pub direct: DVec3,
+    /// What arrives after a reflection, and all that the mesh holds where direct light is not evaluated here.
+    pub indirect: DVec3,
+    /// What is seen of it.
+    pub covering: Covering,
+    /// What arrives from the emitter at hand, and whether its shadow's edge is near.
+    now: DVec3,
+    is_at_edge: bool,
+}
+
+impl LitTexel {
+    /// A dark texel for the site with this index.
+    #[must_use]
+    pub fn new(index: usize, site: &TexelSite) -> Self {
+        Self {
+            site: index,
+            cell: [site.x, site.y],
+            region: site.region,
+            point: site.point,
+            direct: DVec3::ZERO,
+            indirect: DVec3::ZERO,
+            covering: Covering::Seen,
+            now: DVec3::ZERO,
+            is_at_edge: false,
+        }
+    }
 }
 
 /// What all surfaces' texels need.
@@ -53,24 +87,83 @@ pub struct DirectLight<'a> {
 }
 
 impl DirectLight<'_> {
-    /// Adds what all emitters send to `texels` of one surface. `texel` holds the plane steps from one texel to
-    /// the next, right and down, metres.
-    pub fn shine(&self, surface: &Surface, texel: [DVec2; 2], texels: &mut [LitTexel]) -> Effort {
+    /// Adds what all emitters send to `texels` of one surface with its `chart`.
+    pub fn shine(&self, surface: &Surface, chart: &Chart, texels: &mut [LitTexel]) -> Effort {
         let mut effort = Effort::default();
+        let plane_from_texel = chart.texel_from_plane.inverse();
+        let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
         for emitter in self.emitters {
-            let work = Shining { light: self, surface, texel, emitter };
-            let (min, max) = extent(texels);
-            effort.add(work.shine_on(texels, (min, max), None));
+            let work = Shining { light: self, surface, plane_from_texel, cover, emitter };
+            let extent = extent(texels);
+            let done = work.shine_on(texels, extent, None);
+            effort.add(done.effort);
+            take_after_neighbours(texels, |t| &mut t.now);
+            if !done.samples.is_empty() {
+                fit_edges(texels, done.samples);
+            }
+            for texel in texels.iter_mut() {
+                texel.direct += std::mem::take(&mut texel.now);
+                texel.is_at_edge = false;
+            }
         }
         effort
     }
+}
+
+/// Lets the texels at a shadow's edge, and those beside them, fit the samples.
+///
+/// The ones beside the edge have no samples yet: their light is about the same all over.
+fn fit_edges(texels: &mut [LitTexel], mut samples: Vec<LightSample>) {
+    let at_edge: HashSet<[u32; 2]> = texels.iter().filter(|t| t.is_at_edge).map(|t| t.cell).collect();
+    let is_beside = |cell| neighbours(cell).any(|n| at_edge.contains(&n));
+    let mut fitted = Vec::with_capacity(texels.len());
+    for texel in texels.iter() {
+        let is_free = texel.covering != Covering::Under && (texel.is_at_edge || is_beside(texel.cell));
+        if is_free && !texel.is_at_edge && texel.covering == Covering::Seen {
+            let middle = DVec2::new(texel.cell[0].into(), texel.cell[1].into()) + 0.5;
+            let around = [(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)];
+            samples
+                .extend(around.map(|(x, y)| LightSample { at: middle + DVec2::new(x, y), light: texel.now }));
+        }
+        fitted.push(FitTexel { cell: texel.cell, value: texel.now, is_free });
+    }
+    fit(&mut fitted, &samples);
+    for (texel, fitted) in texels.iter_mut().zip(fitted) {
+        texel.now = fitted.value;
+    }
+}
+
+/// What came of a block.
+#[derive(Default)]
+struct Done {
+    effort: Effort,
+    samples: Vec<LightSample>,
+}
+
+impl Done {
+    fn of(effort: Effort) -> Self {
+        Self { effort, samples: Vec::new() }
+    }
+
+    fn and(mut self, other: Self) -> Self {
+        self.effort.add(other.effort);
+        self.samples.extend(other.samples);
+        self
+    }
+}
+
+/// From one texel of a chart to the next, right and down, plane coordinates.
+pub(super) fn texel_steps(chart: &Chart) -> [DVec2; 2] {
+    let plane_from_texel = chart.texel_from_plane.inverse();
+    [DVec2::X, DVec2::Y].map(|d| plane_from_texel.transform_vector2(d))
 }
 
 /// One emitter shining on one surface.
 struct Shining<'a> {
     light: &'a DirectLight<'a>,
     surface: &'a Surface,
-    texel: [DVec2; 2],
+    plane_from_texel: DAffine2,
+    cover: Cover<'a>,
     emitter: &'a Emitter,
 }
 
@@ -81,15 +174,15 @@ fn extent(texels: &[LitTexel]) -> (DVec2, DVec2) {
 }
 
 impl Shining<'_> {
-    fn shine_on(&self, texels: &mut [LitTexel], extent: (DVec2, DVec2), inherited: Option<&[u32]>) -> Effort {
+    fn shine_on(&self, texels: &mut [LitTexel], extent: (DVec2, DVec2), inherited: Option<&[u32]>) -> Done {
         let tracer = self.light.tracer;
         let frame = &self.surface.frame;
         if texels.is_empty() {
-            return Effort::default();
+            return Done::default();
         }
         let hull = self.block(extent);
         if self.emitter.is_behind(&hull, frame.normal, tracer.margin()) {
-            return Effort::default();
+            return Done::default();
         }
         let mut between = Vec::new();
         if inherited.is_none_or(|list| !list.is_empty()) {
@@ -100,10 +193,10 @@ impl Shining<'_> {
             }
         }
         if between.is_empty() {
-            return self.evaluate(texels, |this, t, e| this.irradiance(t.point, Between::Nothing, e));
+            return Done::of(self.shine_freely(texels));
         }
         if self.light.occluders.one_hides(&hull, self.emitter, tracer, &between) {
-            return Effort::default();
+            return Done::default();
         }
         if texels.len() <= SMALL_BLOCK {
             return self.shadow_edge(texels, &self.light.occluders.polygons(tracer, &between));
@@ -122,18 +215,17 @@ impl Shining<'_> {
         let (low_extent, high_extent) = (self::extent(low), self::extent(high));
         let work_low = |low| self.shine_on(low, low_extent, Some(&between));
         let work_high = |high| self.shine_on(high, high_extent, Some(&between));
-        let (mut effort, other) = if parallel {
+        let (done, other) = if parallel {
             rayon::join(|| work_low(low), || work_high(high))
         } else {
             (work_low(low), work_high(high))
         };
-        effort.add(other);
-        effort
+        done.and(other)
     }
 
     /// The corners in space of the block that texels with points in this extent cover.
     fn block(&self, (min, max): (DVec2, DVec2)) -> [DVec3; 4] {
-        let reach = 0.25 * (self.texel[0].abs() + self.texel[1].abs());
+        let reach = 0.5 * (self.cover.step[0].abs() + self.cover.step[1].abs());
         let least = DVec2::splat(self.light.tracer.margin());
         let (low, high) = self.surface.extent();
         let (min, max) = ((min - reach).max(low) - least, (max + reach).min(high) + least);
@@ -141,36 +233,58 @@ impl Shining<'_> {
         [min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)].map(|p| frame.lift(p))
     }
 
-    fn evaluate(
-        &self,
-        texels: &mut [LitTexel],
-        light: impl Fn(&Self, &LitTexel, &mut Evaluation) -> DVec3,
-    ) -> Effort {
+    /// A block that nothing shades.
+    fn shine_freely(&self, texels: &mut [LitTexel]) -> Effort {
         let mut evaluation = Evaluation::new(Precision::TEXEL);
         for texel in texels {
-            texel.direct += light(self, texel, &mut evaluation);
+            texel.now = self.irradiance(texel.point, Between::Nothing, &mut evaluation);
         }
         evaluation.effort
     }
 
     /// A small block in which shadow may fall: one point a texel where the light changes little from texel
-    /// to texel, several where it changes much.
-    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[&[DVec3]]) -> Effort {
+    /// to texel; where it changes much, the mean over several, and these as samples to be fitted.
+    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[&[DVec3]]) -> Done {
         let mut evaluation = Evaluation::new(Precision::TEXEL);
-        let once: Vec<DVec3> = texels
-            .iter()
-            .map(|t| self.irradiance(t.point, Between::Polygons(between), &mut evaluation))
-            .collect();
-        let (least, most) = once
-            .iter()
-            .map(|&e| luminance(e))
-            .fold((f64::INFINITY, 0.0_f64), |(lo, hi), e| (lo.min(e), hi.max(e)));
-        let is_smooth = texels.len() > 1 && most - least <= SMOOTH * most;
-        for (texel, once) in texels.iter_mut().zip(once) {
-            let light = if is_smooth { once } else { self.supersampled(texel, between, &mut evaluation) };
-            texel.direct += light;
+        let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+        for texel in texels.iter_mut() {
+            texel.now = self.irradiance(texel.point, Between::Polygons(between), &mut evaluation);
+            let light = luminance(texel.now);
+            (least, most) = (least.min(light), most.max(light));
         }
-        evaluation.effort
+        let mut samples = Vec::new();
+        if texels.len() == 1 || most - least > SMOOTH * most {
+            for texel in texels.iter_mut().filter(|t| t.covering == Covering::Seen) {
+                let first = samples.len();
+                self.sample(texel, between, (&mut evaluation, &mut samples));
+                let own = &samples[first..];
+                if !own.is_empty() {
+                    texel.now = own.iter().map(|s| s.light).sum::<DVec3>() / own.len() as f64;
+                    texel.is_at_edge = true;
+                }
+            }
+        }
+        Done { effort: evaluation.effort, samples }
+    }
+
+    /// Light at points of the texel's square that lie in its region.
+    fn sample(
+        &self,
+        texel: &LitTexel,
+        between: &[&[DVec3]],
+        (evaluation, samples): (&mut Evaluation, &mut Vec<LightSample>),
+    ) {
+        let rings = self.surface.regions.get(texel.region as usize).map_or(&[][..], |r| &r.rings);
+        let corner = DVec2::new(texel.cell[0].into(), texel.cell[1].into());
+        for k in 0..POINTS_A_SIDE * POINTS_A_SIDE {
+            let place = DVec2::new((k % POINTS_A_SIDE).into(), (k / POINTS_A_SIDE).into());
+            let at = corner + (place + 0.5) / f64::from(POINTS_A_SIDE);
+            let point = self.plane_from_texel.transform_point2(at);
+            if contains(rings, point) && !self.cover.hides(point) {
+                let light = self.irradiance(point, Between::Polygons(between), evaluation);
+                samples.push(LightSample { at, light });
+            }
+        }
     }
 
     fn irradiance(&self, point: DVec2, between: Between, evaluation: &mut Evaluation) -> DVec3 {
@@ -178,23 +292,6 @@ impl Shining<'_> {
         let position = frame.lift(point) + frame.normal * self.light.tracer.margin();
         let receiver = SurfacePoint { position, normal: frame.normal };
         self.emitter.irradiance(receiver, self.light.tracer, between, evaluation)
-    }
-
-    /// The mean over points of the texel that lie in its region; the texel's own point where none does.
-    fn supersampled(&self, texel: &LitTexel, between: &[&[DVec3]], evaluation: &mut Evaluation) -> DVec3 {
-        let rings = self.surface.regions.get(texel.region as usize).map_or(&[][..], |r| &r.rings);
-        let (mut sum, mut count) = (DVec3::ZERO, 0);
-        for (x, y) in SUPERSAMPLES {
-            let point = texel.point + x * self.texel[0] + y * self.texel[1];
-            if contains(rings, point) {
-                sum += self.irradiance(point, Between::Polygons(between), evaluation);
-                count += 1;
-            }
-        }
-        if count == 0 {
-            return self.irradiance(texel.point, Between::Polygons(between), evaluation);
-        }
-        sum / f64::from(count)
     }
 }
 

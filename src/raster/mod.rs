@@ -5,9 +5,11 @@
 //! from it.
 
 mod buried;
+mod cover;
 mod coverage;
 mod dilate;
 mod direct;
+mod fit;
 mod locate;
 
 use std::f64::consts::PI;
@@ -25,9 +27,10 @@ use crate::surface::{Region, Surface};
 use crate::trace::Tracer;
 use crate::unwrap::Atlas;
 use buried::{Outlook, outlook};
+use cover::{Cover, take_after_neighbours};
 pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
-use direct::{DirectLight, LitTexel};
+use direct::{DirectLight, LitTexel, texel_steps};
 use locate::TriangleLocator;
 
 /// A finished lightmap page.
@@ -151,29 +154,26 @@ fn surface_texels(
     indices: &[usize],
     sites: &[TexelSite],
 ) -> (Vec<LitTexel>, Effort) {
-    let mut texels: Vec<LitTexel> = indices
-        .iter()
-        .map(|&site| LitTexel {
-            site,
-            region: sites[site].region,
-            point: sites[site].point,
-            direct: DVec3::ZERO,
-        })
-        .collect();
-    let plane_from_texel = input.atlas.charts[surface].texel_from_plane.inverse();
-    let step = [DVec2::X, DVec2::Y].map(|d| plane_from_texel.transform_vector2(d));
+    let mut texels: Vec<LitTexel> =
+        indices.iter().map(|&index| LitTexel::new(index, &sites[index])).collect();
+    let step = texel_steps(&input.atlas.charts[surface]);
+    let cover = Cover { tracer: input.tracer, surface: &input.surfaces[surface], step };
+    cover.uncover(&mut texels);
     let mut effort = Effort::default();
     if input.options.direct == Direct::Texel {
         let light =
             DirectLight { tracer: input.tracer, occluders: input.occluders, emitters: input.emitters };
-        effort = light.shine(&input.surfaces[surface], step, &mut texels);
+        effort = light.shine(&input.surfaces[surface], &input.atlas.charts[surface], &mut texels);
     }
     let locator = TriangleLocator::new(&input.mesh.surfaces[surface]);
-    let half = 0.5 * (step[0].abs() + step[1].abs());
     for texel in &mut texels {
         let (direct, indirect) = locator.light_at(texel.point, texel.region);
-        let from_mesh = if input.options.direct == Direct::Mesh { direct } else { DVec3::ZERO };
-        let irradiance = texel.direct + from_mesh + indirect;
+        texel.indirect = if input.options.direct == Direct::Mesh { direct + indirect } else { indirect };
+    }
+    take_after_neighbours(&mut texels, |t| &mut t.indirect);
+    let half = 0.5 * (step[0].abs() + step[1].abs());
+    for texel in &mut texels {
+        let irradiance = texel.direct + texel.indirect;
         texel.direct = match input.options.quantity {
             Quantity::Irradiance => irradiance,
             Quantity::Radiance => irradiance / PI,

@@ -22,10 +22,10 @@ use crate::light::luminance;
 use crate::options::Refine;
 
 /// A delivery whose change across the receiving patch is below this fraction of the light there is weak.
-const WEAK: f64 = 6e-4;
+const WEAK: f64 = 4e-4;
 
 /// The error in an element's middle that a delivery may leave, as a fraction of the light there.
-const TOLERANCE: f64 = 1.2e-3;
+const TOLERANCE: f64 = 8e-4;
 
 /// The same for a first delivery, which only shows the second how light varies over the shooters.
 const FIRST_TOLERANCE: f64 = 5e-3;

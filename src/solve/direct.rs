@@ -28,6 +28,12 @@ use crate::trace::Tracer;
 /// light there calls for a split.
 const GRADIENT_TOLERANCE: f64 = 0.04;
 
+/// The share of an emitter's power that an element may make or lose by interpolation.
+const MISPLACED_POWER: f64 = 5e-5;
+
+/// Elements that misplace power are split down to this fraction of the threshold.
+const LEAST_OF_THRESHOLD: f64 = 1.0 / 32.0;
+
 /// Reflectance below which the paper's criterion would no longer see a shot that the lightmap still holds.
 const LEAST_REFLECTANCE: f64 = 0.1;
 
@@ -172,8 +178,13 @@ impl<'a> Receiving<'a> {
 
     fn should_split(&mut self, element: u32, hull: &[DVec3], between: &[u32], is_umbra: bool) -> bool {
         let options = self.pass.options;
-        if self.facet.elements[element as usize].size() <= self.pass.threshold {
-            return false;
+        let size = self.facet.elements[element as usize].size();
+        if size <= self.pass.threshold {
+            let follows_gradient = matches!(options.refine, Refine::Gradient | Refine::CobGradient);
+            let may = follows_gradient && !is_umbra && size > self.pass.threshold * LEAST_OF_THRESHOLD;
+            let misplaces = may && self.misplaces_power(element, between);
+            self.counts.gradient_splits += u64::from(misplaces);
+            return misplaces;
         }
         match options.refine {
             Refine::None => return false,
@@ -259,18 +270,31 @@ impl<'a> Receiving<'a> {
     }
 
     fn gradient_is_steep(&mut self, element: u32, between: &[u32]) -> bool {
+        let arriving = self.arriving(element, between);
+        let e = &self.facet.elements[element as usize];
+        let (direct, _) = self.facet.received(element, e.centroid);
+        let light = luminance(direct) + luminance(arriving.middle.max(arriving.interpolated));
+        let light = light.max(self.pass.typical);
+        arriving.error() > GRADIENT_TOLERANCE * light
+            || (!between.is_empty() && arriving.spread > SHADOW_SPREAD * light)
+    }
+
+    /// Whether the interpolation makes or loses a notable share of all that the emitter sends: close to a
+    /// small strong emitter light changes within less than a texel, and what it reflects must still be right.
+    fn misplaces_power(&mut self, element: u32, between: &[u32]) -> bool {
+        let error = self.arriving(element, between).error();
+        let power = luminance(self.emitter.power(self.pass.tracer.diagonal()));
+        error * self.facet.elements[element as usize].area > MISPLACED_POWER * power
+    }
+
+    fn arriving(&mut self, element: u32, between: &[u32]) -> Arriving {
         let samples = self.facet.elements[element as usize].samples;
         let values = samples.map(|s| self.value(s, between));
-        let centre = self.facet.centre(element);
-        let middle = self.evaluate(centre, between);
+        let middle = self.evaluate(self.facet.centre(element), between);
         let e = &self.facet.elements[element as usize];
         let interpolated = e.interpolate(&e.corner_values(values), e.centroid);
-        let (direct, _) = self.facet.received(element, e.centroid);
-        let light = luminance(direct) + luminance(middle.max(interpolated));
-        let allowed = GRADIENT_TOLERANCE * light.max(self.pass.typical);
         let spread = values.iter().map(|&v| luminance((v - middle).abs())).fold(0.0, f64::max);
-        luminance((middle - interpolated).abs()) > allowed
-            || (!between.is_empty() && spread > SHADOW_SPREAD * light.max(self.pass.typical))
+        Arriving { middle, interpolated, spread }
     }
 
     fn value(&mut self, sample: u32, between: &[u32]) -> DVec3 {
@@ -286,6 +310,22 @@ impl<'a> Receiving<'a> {
         let polygons = self.pass.occluders.polygons(self.pass.tracer, between);
         let between = if polygons.is_empty() { Between::Nothing } else { Between::Polygons(&polygons) };
         self.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation)
+    }
+}
+
+/// A shot's irradiance in an element.
+struct Arriving {
+    /// In the middle.
+    middle: DVec3,
+    /// What the samples' interpolation says of the middle.
+    interpolated: DVec3,
+    /// The most by which a sample's luminance differs from the middle's.
+    spread: f64,
+}
+
+impl Arriving {
+    fn error(&self) -> f64 {
+        luminance((self.middle - self.interpolated).abs())
     }
 }
 

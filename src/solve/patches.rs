@@ -135,6 +135,7 @@ impl Patches {
         let expected = emitted - escaped - onto_backs;
         let scale = DVec3::select(arriving.cmpgt(DVec3::ZERO), expected / arriving, DVec3::ONE)
             .clamp(DVec3::splat(1.0 / MOST_SCALING), DVec3::splat(MOST_SCALING));
+        tracing::debug!(%emitted, %escaped, %onto_backs, %arriving, "from surfaces");
         self.energy.emitted += emitted;
         self.energy.escaped += escaped;
         self.energy.absorbed += onto_backs;
