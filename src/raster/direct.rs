@@ -31,7 +31,7 @@ const SUPERSAMPLES: [(f64, f64); 4] = [(-0.25, -0.25), (0.25, -0.25), (0.25, 0.2
 
 /// A texel that receives direct light.
 #[derive(Clone, Copy, Debug)]
-pub struct LitTexel {
+pub(super) struct LitTexel {
     /// Its index among the sites.
     pub site: usize,
     /// Region of the surface.
@@ -43,7 +43,7 @@ pub struct LitTexel {
 }
 
 /// What all surfaces' texels need.
-pub struct DirectLight<'a> {
+pub(super) struct DirectLight<'a> {
     /// The scene's triangles.
     pub tracer: &'a Tracer,
     /// Their convex outlines.
@@ -55,7 +55,7 @@ pub struct DirectLight<'a> {
 impl DirectLight<'_> {
     /// Adds what all emitters send to `texels` of one surface. `texel` holds the plane steps from one texel to
     /// the next, right and down, metres.
-    pub fn shine(&self, surface: &Surface, texel: [DVec2; 2], texels: &mut [LitTexel]) -> Effort {
+    pub(super) fn shine(&self, surface: &Surface, texel: [DVec2; 2], texels: &mut [LitTexel]) -> Effort {
         let mut effort = Effort::default();
         for emitter in self.emitters {
             let work = Shining { light: self, surface, texel, emitter };
