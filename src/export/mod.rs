@@ -40,7 +40,7 @@ mod writer;
 pub use error::ExportError;
 pub use exr::{decode_exr, encode_exr};
 pub use png::{Png, encode_png};
-pub use verify::verify;
+pub use verify::{lightmap_bytes, verify};
 pub use write::write;
 
 use crate::options::BakeOptions;
