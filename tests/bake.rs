@@ -1,7 +1,7 @@
 //! The whole way, from a file to a lightmapped file: what must hold whatever the stages do inside.
 
 // Clippy lets tests expect things, but not the functions that tests share.
-#![allow(clippy::expect_used)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic)]
 
 #[allow(dead_code, reason = "import's tests use the rest")]
 #[path = "import/draft.rs"]

@@ -409,8 +409,8 @@ fn interrupt_ends_with_130_and_leaves_nothing() {
     assert!(Command::new("sh").args(["-c", &kill]).status().expect("signalled").success());
     let asked = Instant::now();
     let status = child.wait().expect("ended");
-    // A stage asks often; a debug build on a busy machine still answers in seconds.
-    assert!(asked.elapsed() < Duration::from_secs(20));
+    // The bake gets a second to notice, then the program ends without it.
+    assert!(asked.elapsed() < Duration::from_secs(10));
     assert_eq!(status.code(), Some(130));
     assert_eq!(work.names(), ["desk.glb", "in.glb"]);
 }

@@ -5,13 +5,14 @@ use cobake::BakeResult;
 use cobake::error::Error;
 use cobake::options::BakeOptions;
 use cobake::picture;
-use cobake::progress::{Progress, Stage};
+use cobake::progress::Stage;
 use cobake::report::{StageClock, peak_memory_bytes};
 
 use super::args::BakeArgs;
 use super::files::{Files, write_whole};
+use super::interrupt::Interrupt;
 use super::terminal::{TerminalProgress, Voice};
-use super::{interrupt, summary, terminal};
+use super::{summary, terminal};
 
 /// Runs the command. Nothing is written unless the bake went through.
 pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
@@ -26,10 +27,11 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     files.check()?;
 
     let voice = if args.quiet { Voice::Quiet } else { Voice::Normal };
-    let mut progress = TerminalProgress::new(voice, interrupt::watch()?);
+    let interrupt = Interrupt::watch()?;
+    let mut progress = TerminalProgress::new(voice, interrupt.clone());
     let mut result = cobake::bake(files.input, &options, &mut progress)
         .with_context(|| format!("cannot bake {}", files.input.display()))?;
-    if progress.is_cancelled() {
+    if !interrupt.begin_writing() {
         return Err(Error::Cancelled.into());
     }
     write(&files, &mut result)?;
