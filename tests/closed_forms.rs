@@ -1,4 +1,4 @@
-//! The solver against rooms whose light is known in closed form (ACCURACY.md, 3 to 5).
+//! The solver against rooms whose light is known in closed form.
 mod support;
 
 use cobake::options::BakeOptions;
