@@ -3,13 +3,14 @@
 use anyhow::Context;
 use cobake::BakeResult;
 use cobake::error::Error;
+use cobake::export::{self, write_whole};
 use cobake::options::BakeOptions;
 use cobake::picture;
 use cobake::progress::Stage;
 use cobake::report::{StageClock, peak_memory_bytes};
 
 use super::args::BakeArgs;
-use super::files::{Files, write_whole};
+use super::files::Files;
 use super::interrupt::Interrupt;
 use super::terminal::{TerminalProgress, Voice};
 use super::{summary, terminal};
@@ -47,7 +48,7 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
 fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
     let mut clock = StageClock::start();
     clock.begin(Stage::Export);
-    cobake::export::write(files.output, &result.glb).map_err(Error::from)?;
+    export::write(files.output, &result.glb).map_err(Error::from)?;
     result.report.time.add(Stage::Export, clock.finish().total);
     result.report.peak_memory_bytes = peak_memory_bytes();
 
@@ -61,11 +62,12 @@ fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
         };
         let pictures = picture::pictures(subject).context("cannot draw the pictures")?;
         for (name, png) in pictures {
-            write_whole(&folder.join(name), &png)?;
+            write_whole(&folder.join(name), &png).map_err(Error::from)?;
         }
     }
     if let Some(path) = files.report {
-        write_whole(path, result.report.to_json().context("cannot put the report into JSON")?.as_bytes())?;
+        let json = result.report.to_json().context("cannot put the report into JSON")?;
+        write_whole(path, json.as_bytes()).map_err(Error::from)?;
     }
     Ok(())
 }
