@@ -7,7 +7,7 @@ use serde::Serialize;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Refine {
-    /// A priori: where an occluder stands close above the element (Telea and van Overveld 1998).
+    /// A priori: where an occluder stands close above the element (Telea and van Overveld 1997).
     Cob,
     /// A posteriori: where a new vertex differs from the interpolation of its parent's.
     Gradient,
