@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
-use crate::export::{Baked, encode};
+use crate::export::{Baked, encode, lightmap_bytes};
 use crate::options::{BakeOptions, Direct, Resolution};
 use crate::progress::{Progress, Stage};
 use crate::raster::{Lightmap, RasterInput, rasterize};
@@ -150,6 +150,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     report.elements.initial = initial;
     account::fill_report(&mut report, scene, &surfaces, &solution);
     account::fill_texels(&mut report, &atlas, texels);
+    report.lightmap.bytes = lightmap_bytes(&glb);
     recorder.finish(&mut report);
     drop(appearance);
     let Solution { facets, .. } = solution;

@@ -7,7 +7,7 @@ use serde::Serialize;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Refine {
-    /// A priori: where an occluder stands close above the element (Telea and van Overveld 1998).
+    /// A priori: where an occluder stands close above the element (Telea and van Overveld 1997).
     Cob,
     /// A posteriori: where a new vertex differs from the interpolation of its parent's.
     Gradient,
@@ -125,7 +125,8 @@ pub struct BakeOptions {
     pub unshot_fraction: f64,
     /// Reflectances are clamped to this, `[0, 1)`: nothing may reflect all light for ever. Default: 0.95.
     pub max_reflectance: f64,
-    /// Padding around a chart, texels, `[1, 16]`. Default: 4, or less where the page is small.
+    /// Free texels around the texels that bilinear lookups inside a chart touch, `[1, 16]`; twice as
+    /// many lie between two charts. Default: 1, or 0 where the charts do not fit otherwise.
     pub padding: Option<u32>,
     /// Which of the document's scenes to bake. Default: its default scene.
     pub scene: Option<usize>,

@@ -245,7 +245,6 @@ fn places_that_cannot_be_written_to_are_refused_first() {
 }
 
 #[test]
-#[ignore = "needs the joined stages"]
 fn files_that_are_no_scene_are_refused() {
     let work = Workplace::new();
     std::fs::write(work.path("empty.glb"), b"").expect("written");
@@ -345,7 +344,8 @@ fn stage_times_fit_into_the_total() {
 fn pictures_are_pngs_in_a_folder_made_for_them() {
     let work = Workplace::new();
     work.bake(&["--pictures", "made/for/pictures"]).done();
-    for name in ["lightmap.png", "mesh.png"] {
+    let names = ["lightmap.png", "surface-1-elements.png", "surface-1-cob.png", "surface-1-triangles.png"];
+    for name in names {
         let picture = std::fs::read(work.path("made/for/pictures").join(name)).expect("a picture");
         assert!(picture.starts_with(b"\x89PNG\r\n\x1a\n"), "{name}");
     }
@@ -353,7 +353,6 @@ fn pictures_are_pngs_in_a_folder_made_for_them() {
 
 /// The whole of a bake: every stage ran, light was shot, texels hold it.
 #[test]
-#[ignore = "needs the joined stages"]
 fn report_tells_of_a_bake_that_lit_something() {
     let work = Workplace::new();
     work.bake(&["--report", "report.json"]).done();
@@ -377,10 +376,9 @@ fn report_tells_of_a_bake_that_lit_something() {
 
 /// Emitted light is absorbed, escapes or waits: nothing else can happen to it.
 #[test]
-#[ignore = "needs the joined stages"]
 fn energy_ledger_closes() {
-    // The front of the box is open, so that a form factor's error shows here too.
-    const CLOSES_WITHIN: f64 = 0.02;
+    // What leaves through the open front is the rest of each row of form factors, so only rounding is left.
+    const CLOSES_WITHIN: f64 = 1e-3;
     let work = Workplace::new();
     work.bake(&["--report", "report.json"]).done();
     let energy = work.report()["energy"].clone();
@@ -394,7 +392,6 @@ fn energy_ledger_closes() {
 
 #[test]
 #[cfg(unix)]
-#[ignore = "needs the joined stages"]
 fn interrupt_ends_with_130_and_leaves_nothing() {
     use std::time::{Duration, Instant};
 
@@ -412,8 +409,8 @@ fn interrupt_ends_with_130_and_leaves_nothing() {
     assert!(Command::new("sh").args(["-c", &kill]).status().expect("signalled").success());
     let asked = Instant::now();
     let status = child.wait().expect("ended");
-    // A stage asks often; a debug build on a busy machine still answers in seconds.
-    assert!(asked.elapsed() < Duration::from_secs(20));
+    // The bake gets a second to notice, then the program ends without it.
+    assert!(asked.elapsed() < Duration::from_secs(10));
     assert_eq!(status.code(), Some(130));
     assert_eq!(work.names(), ["desk.glb", "in.glb"]);
 }

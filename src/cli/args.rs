@@ -31,7 +31,7 @@ pub(crate) struct BakeArgs {
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
 
-    /// Where the lightmapped scene goes; its folder must exist
+    /// Where the lightmapped scene goes: a .glb file, or a .gltf one that holds everything in itself
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
 
@@ -39,7 +39,7 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
 
-    /// Write lightmap.png and mesh.png into this folder; it is made if there is none
+    /// Write the lightmap and the largest surfaces' meshes as PNGs into this folder, made if there is none
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
 
@@ -63,7 +63,7 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "DENSITY", conflicts_with = "size", allow_negative_numbers = true, help_heading = LIGHTMAP)]
     texels_per_metre: Option<f64>,
 
-    /// Padding around a chart, texels, 1 to 16 [default: 4, or less where the page is small]
+    /// Free texels around what a lookup in a chart touches, 1 to 16 [default: 1, or 0 where charts do not fit otherwise]
     #[arg(long, value_name = "TEXELS", help_heading = LIGHTMAP)]
     padding: Option<u32>,
 

@@ -3,15 +3,17 @@
 use anyhow::Context;
 use cobake::BakeResult;
 use cobake::error::Error;
+use cobake::export::{self, write_whole};
 use cobake::options::BakeOptions;
 use cobake::picture;
-use cobake::progress::{Progress, Stage};
+use cobake::progress::Stage;
 use cobake::report::{StageClock, peak_memory_bytes};
 
 use super::args::BakeArgs;
-use super::files::{Files, write_whole};
+use super::files::Files;
+use super::interrupt::Interrupt;
 use super::terminal::{TerminalProgress, Voice};
-use super::{interrupt, summary, terminal};
+use super::{summary, terminal};
 
 /// Runs the command. Nothing is written unless the bake went through.
 pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
@@ -26,10 +28,11 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     files.check()?;
 
     let voice = if args.quiet { Voice::Quiet } else { Voice::Normal };
-    let mut progress = TerminalProgress::new(voice, interrupt::watch()?);
+    let interrupt = Interrupt::watch()?;
+    let mut progress = TerminalProgress::new(voice, interrupt.clone());
     let mut result = cobake::bake(files.input, &options, &mut progress)
         .with_context(|| format!("cannot bake {}", files.input.display()))?;
-    if progress.is_cancelled() {
+    if !interrupt.begin_writing() {
         return Err(Error::Cancelled.into());
     }
     write(&files, &mut result)?;
@@ -45,7 +48,7 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
 fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
     let mut clock = StageClock::start();
     clock.begin(Stage::Export);
-    cobake::export::write(files.output, &result.glb).map_err(Error::from)?;
+    export::write(files.output, &result.glb).map_err(Error::from)?;
     result.report.time.add(Stage::Export, clock.finish().total);
     result.report.peak_memory_bytes = peak_memory_bytes();
 
@@ -59,11 +62,12 @@ fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
         };
         let pictures = picture::pictures(subject).context("cannot draw the pictures")?;
         for (name, png) in pictures {
-            write_whole(&folder.join(name), &png)?;
+            write_whole(&folder.join(name), &png).map_err(Error::from)?;
         }
     }
     if let Some(path) = files.report {
-        write_whole(path, result.report.to_json().context("cannot put the report into JSON")?.as_bytes())?;
+        let json = result.report.to_json().context("cannot put the report into JSON")?;
+        write_whole(path, json.as_bytes()).map_err(Error::from)?;
     }
     Ok(())
 }

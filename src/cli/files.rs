@@ -1,8 +1,8 @@
-//! Where results go: checked before the work, written whole or not at all.
+//! Where results go, checked before the work that they take.
 
 use std::ffi::OsString;
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -92,20 +92,6 @@ fn check_picture_folder(folder: &Path) -> anyhow::Result<()> {
     temporary_in(nearest).map(drop).with_context(|| format!("cannot write into {}", folder.display()))
 }
 
-/// Writes `bytes` to a temporary name beside `path` and renames it, so that no half file is ever seen.
-/// A symbolic link is followed.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let write = || -> anyhow::Result<()> {
-        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let mut file = temporary_beside(&target)?;
-        file.write_all(bytes)?;
-        file.as_file().sync_all()?;
-        file.persist(&target).map_err(|failed| failed.error)?;
-        Ok(())
-    };
-    write().with_context(|| format!("cannot write {}", path.display()))
-}
-
 fn temporary_beside(path: &Path) -> anyhow::Result<NamedTempFile> {
     temporary_in(folder_of(path))
 }
@@ -118,12 +104,7 @@ fn temporary_in(folder: &Path) -> anyhow::Result<NamedTempFile> {
         Ok(found) if !found.is_dir() => bail!("{} is not a folder", folder.display()),
         _ => {}
     }
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".cobake-");
-    // A temporary file is private by default; the result is to be as readable as any other new file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    Ok(builder.tempfile_in(folder)?)
+    Ok(tempfile::Builder::new().prefix(".cobake-").tempfile_in(folder)?)
 }
 
 #[cfg(test)]
@@ -174,27 +155,5 @@ mod tests {
         let inside = folder.path().join("out.glb");
         assert!(Files { output: &inside, pictures: Some(&input), ..good }.check().is_err());
         assert!(Files { output: folder.path(), ..good }.check().is_err());
-    }
-
-    #[test]
-    fn a_written_file_replaces_the_old_one_whole() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("report.json");
-        fs::write(&path, b"a longer old report").expect("written");
-        write_whole(&path, b"new").expect("written");
-        assert_eq!(fs::read(&path).expect("read"), b"new");
-        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
-    }
-
-    #[test]
-    #[cfg(unix)]
-    fn a_written_file_is_as_readable_as_any_new_file() {
-        use std::os::unix::fs::PermissionsExt;
-        let folder = tempfile::tempdir().expect("a folder");
-        let mode = |path: &Path| fs::metadata(path).expect("there").permissions().mode();
-        let (whole, plain) = (folder.path().join("whole"), folder.path().join("plain"));
-        write_whole(&whole, b"x").expect("written");
-        fs::write(&plain, b"x").expect("written");
-        assert_eq!(mode(&whole), mode(&plain));
     }
 }

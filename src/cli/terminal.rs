@@ -1,12 +1,12 @@
 //! What a person sees on stderr while a bake runs.
 
 use std::io::{self, IsTerminal, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use cobake::progress::{Progress, Stage};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::interrupt::Interrupt;
 
 /// Steps of a stage's bar: finer than any terminal is wide.
 const STEPS: u64 = 1000;
@@ -36,12 +36,12 @@ pub(crate) enum Voice {
 pub(crate) struct TerminalProgress {
     bar: ProgressBar,
     voice: Voice,
-    stop: Arc<AtomicBool>,
+    interrupt: Interrupt,
 }
 
 impl TerminalProgress {
-    /// Draws nothing until the first stage begins. `stop` cancels the bake when it turns true.
-    pub(crate) fn new(voice: Voice, stop: Arc<AtomicBool>) -> Self {
+    /// Draws nothing until the first stage begins. `interrupt` cancels the bake.
+    pub(crate) fn new(voice: Voice, interrupt: Interrupt) -> Self {
         let target = match voice {
             Voice::Normal if is_watched() => ProgressDrawTarget::stderr(),
             _ => ProgressDrawTarget::hidden(),
@@ -50,7 +50,7 @@ impl TerminalProgress {
         if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
             bar.set_style(style.progress_chars("=> "));
         }
-        Self { bar, voice, stop }
+        Self { bar, voice, interrupt }
     }
 
     /// Takes the bar away.
@@ -86,6 +86,6 @@ impl Progress for TerminalProgress {
     }
 
     fn is_cancelled(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.interrupt.is_asked()
     }
 }

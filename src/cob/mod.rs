@@ -8,7 +8,7 @@
 //! into the child's.
 //!
 //! A. Telea, C. van Overveld, "The Close Objects Buffer: A Sharp Shadow Detection Technique
-//! for Radiosity Methods", Journal of Graphics Tools 2(2), 1997/1998.
+//! for Radiosity Methods", Journal of Graphics Tools 2(2), 1997.
 
 use glam::DVec3;
 

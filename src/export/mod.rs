@@ -40,8 +40,8 @@ mod writer;
 pub use error::ExportError;
 pub use exr::{decode_exr, encode_exr};
 pub use png::{Png, encode_png};
-pub use verify::verify;
-pub use write::write;
+pub use verify::{lightmap_bytes, verify};
+pub use write::{write, write_whole};
 
 use crate::options::BakeOptions;
 use crate::raster::Lightmap;

@@ -21,8 +21,16 @@ pub fn write(path: &Path, glb: &[u8]) -> Result<(), ExportError> {
     verify(glb)?;
     let text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf"));
     let text = if text { Some(glb::as_text(glb)?) } else { None };
-    let bytes = text.as_deref().unwrap_or(glb);
+    write_whole(path, text.as_deref().unwrap_or(glb))
+}
 
+/// Puts `bytes` at `path`, whole or not at all, replacing a file that is there.
+///
+/// A symbolic link is followed, so that the file it names is replaced.
+///
+/// # Errors
+/// Names the place and the remedy; nothing is left behind.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
     let target = resolve(path)?;
     let folder = match target.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

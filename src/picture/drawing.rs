@@ -1,7 +1,7 @@
 //! Planar meshes as pictures: filled cells, their outlines, lines on top, a row of swatches.
 //!
 //! Three pictures are meant to be drawn with this: a surface's elements filled by their
-//! irradiance (as in figure 5 of Telea and van Overveld 1998), its Close Objects Buffers by state,
+//! irradiance (as in figure 5 of Telea and van Overveld 1997), its Close Objects Buffers by state,
 //! and the final triangles.
 
 use glam::DVec2;

@@ -1,8 +1,8 @@
 //! After the last stage: pictures for people.
 //!
 //! Lightmaps and planar drawings become PNG: what the solver did to a surface can be looked at
-//! without a viewer. Everything here takes plain data, polygons and colours, and knows no stage's
-//! types but the lightmap's. Pictures carry no text; the caller's file names say what they show.
+//! without a viewer. Only [`pictures`] knows the stages' types; the rest takes plain data, polygons
+//! and colours. Pictures carry no text; their file names say what they show.
 
 mod bake;
 mod canvas;

@@ -21,7 +21,7 @@ const NARROW: f64 = 0.02;
 
 /// What is seen from a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outlook {
+pub(super) enum Outlook {
     /// The scene.
     Open,
     /// Hardly anything but what is close by.
@@ -32,7 +32,7 @@ pub enum Outlook {
 
 /// What is seen from a region of a surface.
 #[must_use]
-pub fn outlook(surface: &Surface, region: &Region, tracer: &Tracer) -> Outlook {
+pub(super) fn outlook(surface: &Surface, region: &Region, tracer: &Tracer) -> Outlook {
     let mut largest: Vec<_> = region.triangles.iter().collect();
     let area = |t: &&[glam::DVec2; 3]| triangle::area(t.map(|p| p.extend(0.0)));
     largest.sort_by(|a, b| area(b).total_cmp(&area(a)));

@@ -38,7 +38,7 @@ const POINTS_A_SIDE: u32 = 3;
 
 /// A texel that receives direct light.
 #[derive(Clone, Copy, Debug)]
-pub struct LitTexel {
+pub(super) struct LitTexel {
     /// Its index among the sites.
     pub site: usize,
     /// Column and row.
@@ -77,7 +77,7 @@ impl LitTexel {
 }
 
 /// What all surfaces' texels need.
-pub struct DirectLight<'a> {
+pub(super) struct DirectLight<'a> {
     /// The scene's triangles.
     pub tracer: &'a Tracer,
     /// Their convex outlines.
@@ -88,7 +88,7 @@ pub struct DirectLight<'a> {
 
 impl DirectLight<'_> {
     /// Adds what all emitters send to `texels` of one surface with its `chart`.
-    pub fn shine(&self, surface: &Surface, chart: &Chart, texels: &mut [LitTexel]) -> Effort {
+    pub(super) fn shine(&self, surface: &Surface, chart: &Chart, texels: &mut [LitTexel]) -> Effort {
         let mut effort = Effort::default();
         let plane_from_texel = chart.texel_from_plane.inverse();
         let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };

@@ -6,7 +6,7 @@ use crate::geom::triangle_grid::{TriangleGrid, nearest_in_triangle};
 use crate::retriangulate::SurfaceMesh;
 
 /// Finds a surface's light by position.
-pub struct TriangleLocator<'a> {
+pub(super) struct TriangleLocator<'a> {
     mesh: &'a SurfaceMesh,
     grid: TriangleGrid,
 }
@@ -14,7 +14,7 @@ pub struct TriangleLocator<'a> {
 impl<'a> TriangleLocator<'a> {
     /// Sorts the triangles.
     #[must_use]
-    pub fn new(mesh: &'a SurfaceMesh) -> Self {
+    pub(super) fn new(mesh: &'a SurfaceMesh) -> Self {
         let corners: Vec<_> =
             mesh.triangles.iter().map(|t| t.map(|v| mesh.vertices[v as usize].position)).collect();
         Self { mesh, grid: TriangleGrid::new(&corners) }
@@ -23,7 +23,7 @@ impl<'a> TriangleLocator<'a> {
     /// Direct and indirect irradiance at `p`, interpolated in the triangle of `region` that contains it, or in
     /// the nearest one where rounding left it outside of all. Black where there is no triangle.
     #[must_use]
-    pub fn light_at(&self, p: DVec2, region: u32) -> (DVec3, DVec3) {
+    pub(super) fn light_at(&self, p: DVec2, region: u32) -> (DVec3, DVec3) {
         let mut best = (f64::INFINITY, [0.0; 3], 0);
         for &t in self.grid.candidates(p) {
             let corners = self.mesh.triangles[t as usize].map(|v| self.mesh.vertices[v as usize].position);

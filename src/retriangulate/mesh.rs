@@ -56,7 +56,7 @@ fn leaf_points(facets: &[&Facet]) -> Vec<DVec2> {
             let e = &facet.elements[leaf as usize];
             match &e.cut {
                 None => {
-                    points.extend([e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)])
+                    points.extend([e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)]);
                 }
                 Some(cut) => points.extend(cut.rings.iter().flatten()),
             }

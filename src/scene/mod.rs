@@ -4,10 +4,10 @@
 //! triangles; the only glTF they keep is [`SourceDocument`], which the export
 //! stage alone opens again.
 //!
-//! The order of work: [`container`] splits the file, [`document`] types its JSON, [`extension`] refuses
-//! what cannot be honoured, [`source`] reads buffers and images, [`hierarchy`] finds the nodes' places,
-//! [`place`] puts [`primitive`]s there (through [`accessor`]s), [`material`] and [`punctual`] read what
-//! shines and reflects, and [`appearance`] answers what a point looks like ([`texture`], [`pyramid`]).
+//! The order of work: `container` splits the file, `document` types its JSON, `extension` refuses
+//! what cannot be honoured, `source` reads buffers and images, `hierarchy` finds the nodes' places,
+//! `place` puts `primitive`s there (through `accessor`s), `material` and `punctual` read what
+//! shines and reflects, and `appearance` answers what a point looks like (`texture`, `pyramid`).
 //!
 //! Every index, offset and length is checked where it is followed; nothing is allocated by a count
 //! alone. What is wrong is an [`ImportError`]; what is merely odd is a warning.

@@ -379,6 +379,8 @@ fn punctual_irradiance(light: &PunctualLight, receiver: SurfacePoint) -> DVec3 {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
 
     fn floor_point(x: f64) -> SurfacePoint {
@@ -387,10 +389,9 @@ mod tests {
 
     fn lamp() -> AreaEmitter {
         let frame = Frame::new(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, DVec3::X);
-        let ring =
-            [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| DVec2::new(x, y)).to_vec();
-        let t = [[ring[0], ring[1], ring[2]], [ring[0], ring[2], ring[3]]];
-        AreaEmitter::new(frame, &[ring], &t, DVec3::ONE)
+        let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+        let ring = corners.map(|(x, y)| frame.lift(DVec2::new(x, y))).to_vec();
+        AreaEmitter::new(frame, vec![ring], 1.0, DVec3::ONE)
     }
 
     /// Exact clipping and kernel-weighted rays are two methods for the same number.

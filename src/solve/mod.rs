@@ -4,7 +4,7 @@
 //! punctual lights, both onto elements that split where their shadows fall ([`direct`]).
 //! Then patches shoot what they reflect among each other ([`patches`]), the one with the
 //! most unshot power first, until the unshot power is a small fraction of the emitted; and
-//! what each sent is delivered once to the elements ([`deliver`]).
+//! what each sent is delivered once to the elements ([`mod@deliver`]).
 
 pub mod deliver;
 pub mod direct;

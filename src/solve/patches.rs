@@ -4,7 +4,7 @@
 //! Chen, Wallace, Greenberg, "A Progressive Refinement Approach to Fast Radiosity Image
 //! Generation", 1988). Each pair's exchange factor is found once, when one of the two first
 //! shoots, and serves both by reciprocity. What patches send in the end is delivered to the
-//! elements by [`deliver`](super::deliver).
+//! elements by [`deliver`](mod@super::deliver).
 //!
 //! Exchange factors come from closed forms in few points, so a patch's row does not sum
 //! exactly to what leaves it. A fixed set of cosine-distributed rays says which share

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use cobake::export::{ExportError, encode, write};
+use cobake::export::{ExportError, encode, write, write_whole};
 
 use crate::fixture::{Results, document};
 
@@ -38,6 +38,19 @@ fn files_are_replaced_whole() {
     write(&path, &glb).unwrap();
     assert_eq!(fs::read(&path).unwrap(), glb);
     assert_eq!(names(folder.path()), ["out.glb"]);
+}
+
+/// A temporary file is private; what becomes of it is not.
+#[cfg(unix)]
+#[test]
+fn files_are_as_readable_as_any_new_file() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    let mode = |path: &std::path::Path| fs::metadata(path).unwrap().permissions().mode();
+    let (whole, plain) = (folder.path().join("whole"), folder.path().join("plain"));
+    write_whole(&whole, b"x").unwrap();
+    fs::write(&plain, b"x").unwrap();
+    assert_eq!(mode(&whole), mode(&plain));
 }
 
 /// A bad document changes nothing, a folder or a missing place is named, and nothing is left behind.

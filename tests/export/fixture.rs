@@ -305,7 +305,8 @@ pub(crate) fn place(source: SourceDocument) -> Scene {
         }
     }
     let (materials, lights, warnings) = (Vec::new(), Vec::new(), Vec::new());
-    Scene { vertices, triangles, placements, materials, lights, source, warnings }
+    let appearance = Default::default();
+    Scene { vertices, triangles, placements, materials, lights, source, warnings, appearance }
 }
 
 /// The planes of each placement; their outlines are taken to be the hulls' bounding boxes.

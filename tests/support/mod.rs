@@ -1,5 +1,6 @@
 //! Rooms made by hand, whose light is known in closed form.
 #![allow(dead_code, reason = "each test binary uses a part")]
+#![allow(clippy::expect_used, reason = "clippy lets tests expect things, but not what they share")]
 
 use cobake::element::{Facet, MeshOptions, SurfaceAppearance, build};
 use cobake::geom::Frame;
@@ -11,7 +12,7 @@ use cobake::trace::Tracer;
 use glam::{DVec2, DVec3};
 
 /// A flat polygon facing the side from which `corners` run counter-clockwise.
-pub fn polygon(corners: &[DVec3], index: usize) -> Surface {
+pub(crate) fn polygon(corners: &[DVec3], index: usize) -> Surface {
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
     let frame = Frame::new(corners[0], normal, corners[1] - corners[0]);
     let ring: Vec<DVec2> = corners.iter().map(|&c| frame.project(c)).collect();
@@ -31,7 +32,7 @@ pub fn polygon(corners: &[DVec3], index: usize) -> Surface {
 }
 
 /// The six walls of a box from `min` to `max`, facing inward.
-pub fn room(min: DVec3, max: DVec3) -> Vec<Surface> {
+pub(crate) fn room(min: DVec3, max: DVec3) -> Vec<Surface> {
     let p =
         |x: usize, y: usize, z: usize| DVec3::new([min.x, max.x][x], [min.y, max.y][y], [min.z, max.z][z]);
     let walls = [
@@ -46,7 +47,7 @@ pub fn room(min: DVec3, max: DVec3) -> Vec<Surface> {
 }
 
 /// An icosphere of radius 1 seen from inside.
-pub fn sphere(subdivisions: u32) -> Vec<Surface> {
+pub(crate) fn sphere(subdivisions: u32) -> Vec<Surface> {
     let g = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let v = [
         (-1.0, g, 0.0),
@@ -99,9 +100,9 @@ pub fn sphere(subdivisions: u32) -> Vec<Surface> {
 }
 
 /// All surfaces reflect and emit alike.
-pub struct Uniform {
-    pub reflectance: f64,
-    pub exitance: f64,
+pub(crate) struct Uniform {
+    pub(crate) reflectance: f64,
+    pub(crate) exitance: f64,
 }
 
 impl SurfaceAppearance for Uniform {
@@ -114,16 +115,16 @@ impl SurfaceAppearance for Uniform {
 }
 
 /// A scene made by hand.
-pub struct Case<'a> {
-    pub surfaces: &'a [Surface],
-    pub appearance: &'a (dyn SurfaceAppearance + Sync),
-    pub lights: &'a [PunctualLight],
-    pub patch_size: f64,
-    pub threshold: f64,
+pub(crate) struct Case<'a> {
+    pub(crate) surfaces: &'a [Surface],
+    pub(crate) appearance: &'a (dyn SurfaceAppearance + Sync),
+    pub(crate) lights: &'a [PunctualLight],
+    pub(crate) patch_size: f64,
+    pub(crate) threshold: f64,
 }
 
 impl Case<'_> {
-    pub fn solve(&self, options: &BakeOptions) -> Solution {
+    pub(crate) fn solve(&self, options: &BakeOptions) -> Solution {
         let triangles: Vec<[DVec3; 3]> = self
             .surfaces
             .iter()
@@ -153,7 +154,7 @@ impl Case<'_> {
 }
 
 /// `(direct, indirect)` irradiance in the middle of every leaf, with the leaf's area.
-pub fn leaves(facets: &[Facet]) -> Vec<(f64, DVec3, DVec3)> {
+pub(crate) fn leaves(facets: &[Facet]) -> Vec<(f64, DVec3, DVec3)> {
     facets
         .iter()
         .flat_map(|f| {
