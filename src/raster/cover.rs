@@ -56,7 +56,7 @@ impl Cover<'_> {
             if self.hides(texel.point) {
                 if let Some(point) = self.seen_place(texel, 1.0) {
                     texel.point = point;
-                } else if self.seen_place(texel, 1.4).is_some() {
+                } else if self.seen_place(texel, 1.2).is_some() {
                     texel.covering = Covering::Beside;
                 } else {
                     texel.covering = Covering::Under;
