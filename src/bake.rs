@@ -133,6 +133,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         tracer: &tracer,
         occluders: &solution.occluders,
         emitters: &solution.emitters,
+        typical: solution.typical,
         appearance: &appearance,
         options,
     });

@@ -31,7 +31,11 @@ const SMALL_BLOCK: usize = 8;
 const PARALLEL_BLOCK: usize = 4096;
 
 /// Light that changes by less than this fraction within a small block is taken once a texel.
-const SMOOTH: f64 = 0.15;
+const SMOOTH: f64 = 0.3;
+
+/// Light from one emitter that is everywhere below this fraction of the scene's typical light is taken once a
+/// texel, too.
+const DIM: f64 = 0.02;
 
 /// Where a shadow's edge crosses a texel, light is evaluated at this many points a side of it.
 const POINTS_A_SIDE: u32 = 3;
@@ -84,6 +88,8 @@ pub(super) struct DirectLight<'a> {
     pub occluders: &'a Occluders,
     /// What shines.
     pub emitters: &'a [Emitter],
+    /// Mean luminance of the irradiance in the scene's mesh.
+    pub typical: f64,
 }
 
 impl DirectLight<'_> {
@@ -253,7 +259,8 @@ impl Shining<'_> {
             (least, most) = (least.min(light), most.max(light));
         }
         let mut samples = Vec::new();
-        if texels.len() == 1 || most - least > SMOOTH * most {
+        let is_bright = most > DIM * self.light.typical;
+        if is_bright && (texels.len() == 1 || most - least > SMOOTH * most) {
             for texel in texels.iter_mut().filter(|t| t.covering == Covering::Seen) {
                 let first = samples.len();
                 self.sample(texel, between, (&mut evaluation, &mut samples));

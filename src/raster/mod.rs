@@ -58,6 +58,8 @@ pub struct RasterInput<'a> {
     pub occluders: &'a Occluders,
     /// What shines.
     pub emitters: &'a [Emitter],
+    /// Mean luminance of the irradiance on all surfaces.
+    pub typical: f64,
     /// Reflectance and emission, for [`Quantity::Radiosity`].
     pub appearance: &'a (dyn SurfaceAppearance + Sync),
     /// The caller's options.
@@ -161,8 +163,12 @@ fn surface_texels(
     cover.uncover(&mut texels);
     let mut effort = Effort::default();
     if input.options.direct == Direct::Texel {
-        let light =
-            DirectLight { tracer: input.tracer, occluders: input.occluders, emitters: input.emitters };
+        let light = DirectLight {
+            tracer: input.tracer,
+            occluders: input.occluders,
+            emitters: input.emitters,
+            typical: input.typical,
+        };
         effort = light.shine(&input.surfaces[surface], &input.atlas.charts[surface], &mut texels);
     }
     let locator = TriangleLocator::new(&input.mesh.surfaces[surface]);

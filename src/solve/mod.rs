@@ -61,6 +61,8 @@ pub struct Solution {
     pub emitters: Vec<Emitter>,
     /// Convex outlines of what occludes.
     pub occluders: Occluders,
+    /// Mean luminance of the irradiance on all facets.
+    pub typical: f64,
     /// Where the light went.
     pub energy: Energy,
     /// Shots by emitters, lights and patches.
@@ -133,6 +135,7 @@ pub fn solve(
     let emitters: Vec<Emitter> = glowing.into_iter().chain(lights).collect();
     Some(Solution {
         facets,
+        typical: patches.mean_irradiance(),
         energy: patches.energy,
         shots: emitters.len() as u64 + patches.shots,
         rays: patches.rays + direct.effort.rays + delivery.effort.rays,

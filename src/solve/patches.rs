@@ -28,6 +28,9 @@ const FAR: f64 = 6.0;
 /// Factors below this are found with one shadow ray.
 const WEAK_FACTOR: f64 = 2e-4;
 
+/// Factors below this, the larger of a pair's two, are left out; the row's scaling makes up for them.
+const NEGLIGIBLE_FACTOR: f64 = 2e-6;
+
 /// A row is scaled by no more than this to close its energy balance.
 const MOST_SCALING: f64 = 2.0;
 
@@ -331,7 +334,7 @@ fn exchange(a: &Patch, b: &Patch, tracer: &Tracer) -> (f64, u64) {
         } else {
             shooter.shape.unoccluded(receiver.centre)
         };
-        if f <= 0.0 {
+        if f < NEGLIGIBLE_FACTOR {
             return (0.0, 0);
         }
         if f < WEAK_FACTOR {

@@ -11,6 +11,9 @@ use glam::DVec3;
 use super::Tracer;
 use crate::geom::Bounds;
 
+/// A triangle cut by a shaft's planes has fewer corners than this.
+const MOST_CORNERS: usize = 20;
+
 /// A half-space `normal · x ≥ offset`.
 #[derive(Clone, Copy, Debug)]
 struct HalfSpace {
@@ -54,46 +57,47 @@ impl Shaft {
     /// Whether a triangle reaches into the shaft.
     #[must_use]
     pub fn touches(&self, triangle: &[DVec3; 3]) -> bool {
-        let mut heights = [[0.0; 3]; 32];
-        let planes = &self.planes[..self.planes.len().min(32)];
-        let mut all_inside = true;
-        for (plane, heights) in planes.iter().zip(&mut heights) {
-            *heights = triangle.map(|v| plane.normal.dot(v) - plane.offset - self.margin);
-            if heights.iter().all(|&h| h <= 0.0) {
+        let mut is_inside = true;
+        for plane in &self.planes {
+            let offset = plane.offset + self.margin;
+            let above = triangle.map(|v| plane.normal.dot(v) > offset);
+            if above == [false; 3] {
                 return false;
             }
-            all_inside &= heights.iter().all(|&h| h > 0.0);
+            is_inside &= above == [true; 3];
         }
-        all_inside || self.clips_to_something(triangle)
+        is_inside || self.clips_to_something(triangle)
     }
 
     /// Cuts the triangle down to the shaft; something left means that it reaches in.
     fn clips_to_something(&self, triangle: &[DVec3; 3]) -> bool {
-        let mut corners = [DVec3::ZERO; 40];
-        corners[..3].copy_from_slice(triangle);
+        let mut from = [DVec3::ZERO; MOST_CORNERS];
+        let mut to = from;
+        from[..3].copy_from_slice(triangle);
         let mut count = 3;
         for plane in &self.planes {
-            let mut next = [DVec3::ZERO; 40];
+            let offset = plane.offset + self.margin;
             let mut kept = 0;
-            for i in 0..count {
-                let (a, b) = (corners[i], corners[if i + 1 == count { 0 } else { i + 1 }]);
-                let (ha, hb) = (plane.height(a) - self.margin, plane.height(b) - self.margin);
-                if kept + 2 > next.len() {
+            let (mut a, mut height_a) = (from[count - 1], plane.normal.dot(from[count - 1]) - offset);
+            for &b in &from[..count] {
+                let height_b = plane.normal.dot(b) - offset;
+                if kept + 2 > MOST_CORNERS {
                     return true; // More planes than a shaft has: say yes, which is always safe.
                 }
-                if ha > 0.0 {
-                    next[kept] = a;
+                if (height_a > 0.0) != (height_b > 0.0) {
+                    to[kept] = a + (b - a) * (height_a / (height_a - height_b));
                     kept += 1;
                 }
-                if (ha > 0.0) != (hb > 0.0) {
-                    next[kept] = a + (b - a) * (ha / (ha - hb));
+                if height_b > 0.0 {
+                    to[kept] = b;
                     kept += 1;
                 }
+                (a, height_a) = (b, height_b);
             }
             if kept == 0 {
                 return false;
             }
-            corners = next;
+            std::mem::swap(&mut from, &mut to);
             count = kept;
         }
         true
