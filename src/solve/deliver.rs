@@ -143,8 +143,7 @@ impl Delivery<'_> {
                 let most = (patch.area / (std::f64::consts::PI * distance * distance)).min(1.0).max(known);
                 let change = (2.0 * to.radius / distance).min(1.0);
                 if to.radius <= self.pass.indirect_threshold
-                    || luminance(shooter.radiosity) * most * change
-                        < WEAK / TOLERANCE * self.tolerance * self.reference
+                    || luminance(shooter.radiosity) * most * change < WEAK * self.reference
                 {
                     *kept += shooter.radiosity * known;
                     self.counts.weak += 1;
