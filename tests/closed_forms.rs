@@ -6,10 +6,10 @@ use cobake::scene::{PunctualKind, PunctualLight};
 use glam::DVec3;
 use support::{Case, Uniform, leaves, room, sphere};
 
-/// The furnace as the solver is today: the patches' exchange is balanced, but not what the elements
-/// receive at the end, and the corners of a bright room get too little. The aim is 0.02 and 0.002.
-const FURNACE_LOCAL: f64 = 0.08;
-const FURNACE_MEAN: f64 = 0.015;
+/// The mean is balanced; the corners of a bright room get too little still, up to 6.4 % at a reflectance of
+/// 0.95, where interpolation in elements sums over twenty bounces. The aim is 0.02.
+const FURNACE_LOCAL: f64 = 0.07;
+const FURNACE_MEAN: f64 = 0.002;
 
 /// 3. White furnace: every point of a closed room that glows evenly has the same radiosity.
 #[test]

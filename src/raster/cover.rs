@@ -21,7 +21,7 @@ const PLACES_A_SIDE: u32 = 5;
 
 /// What is seen of a texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Covering {
+pub(super) enum Covering {
     /// At least a part of it.
     Seen,
     /// Nothing, but places nearby whose lookups touch it.

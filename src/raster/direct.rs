@@ -65,7 +65,7 @@ pub(super) struct LitTexel {
 impl LitTexel {
     /// A dark texel for the site with this index.
     #[must_use]
-    pub fn new(index: usize, site: &TexelSite) -> Self {
+    pub(super) fn new(index: usize, site: &TexelSite) -> Self {
         Self {
             site: index,
             cell: [site.x, site.y],

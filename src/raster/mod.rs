@@ -14,7 +14,6 @@ mod locate;
 
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::element::SurfaceAppearance;
