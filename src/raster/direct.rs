@@ -190,14 +190,7 @@ impl Shining<'_> {
         if self.emitter.is_behind(&hull, frame.normal, tracer.margin()) {
             return Done::default();
         }
-        let mut between = Vec::new();
-        if inherited.is_none_or(|list| !list.is_empty()) {
-            let shaft = self.emitter.shaft(&hull, tracer);
-            match inherited {
-                None => shaft.gather(tracer, &mut between),
-                Some(list) => shaft.filter(tracer, list, &mut between),
-            }
-        }
+        let between = self.emitter.between(&hull, tracer, inherited);
         if between.is_empty() {
             return Done::of(self.shine_freely(texels));
         }

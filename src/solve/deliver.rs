@@ -170,14 +170,7 @@ impl Delivery<'_> {
         if emitter.is_behind(&hull, self.facet.frame.normal, tracer.margin()) {
             return;
         }
-        let mut between = Vec::new();
-        if inherited.is_none_or(|list| !list.is_empty()) {
-            let shaft = emitter.shaft(&hull, tracer);
-            match inherited {
-                None => shaft.gather(tracer, &mut between),
-                Some(list) => shaft.filter(tracer, list, &mut between),
-            }
-        }
+        let between = emitter.between(&hull, tracer, inherited);
         if !between.is_empty() && self.pass.occluders.one_hides(&hull, emitter, tracer, &between) {
             return;
         }

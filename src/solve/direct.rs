@@ -136,14 +136,7 @@ impl<'a> Receiving<'a> {
         if self.emitter.is_behind(&hull, self.facet.frame.normal, tracer.margin()) {
             return;
         }
-        let mut between = Vec::new();
-        if inherited.is_none_or(|list| !list.is_empty()) {
-            let shaft = self.emitter.shaft(&hull, tracer);
-            match inherited {
-                None => shaft.gather(tracer, &mut between),
-                Some(list) => shaft.filter(tracer, list, &mut between),
-            }
-        }
+        let between = self.emitter.between(&hull, tracer, inherited);
         let is_umbra = self.pass.options.umbra_test == Toggle::On
             && !between.is_empty()
             && self.pass.occluders.one_hides(&hull, self.emitter, tracer, &between);

@@ -290,6 +290,19 @@ impl Emitter {
         }
     }
 
+    /// The triangles that reach into the shaft from `receiver`, ascending. `inherited` holds what reaches
+    /// into a shaft that contains this one: the parent's, handed down.
+    #[must_use]
+    pub fn between(&self, receiver: &[DVec3], tracer: &Tracer, inherited: Option<&[u32]>) -> Vec<u32> {
+        let mut between = Vec::new();
+        match inherited {
+            None => self.shaft(receiver, tracer).gather(tracer, &mut between),
+            Some([]) => {}
+            Some(list) => self.shaft(receiver, tracer).filter(tracer, list, &mut between),
+        }
+        between
+    }
+
     /// Points that together hide the whole emitter from `at` when each is hidden by the same convex occluder.
     pub(crate) fn corners_seen_from(&self, at: DVec3, diagonal: f64, out: &mut Vec<DVec3>) {
         out.clear();
