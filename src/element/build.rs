@@ -9,7 +9,7 @@ use super::sampling::plane_fit;
 use super::{Cut, Element, NONE};
 use crate::cob::{Cob, CobLists};
 use crate::geom::hull::convex_hull;
-use crate::geom::polygon::{area, clip_rectangle};
+use crate::geom::polygon::{area, clip_rectangle, rectangle};
 use crate::geom::{Frame, Ring};
 use crate::surface::Surface;
 
@@ -168,7 +168,7 @@ impl Facet {
             return false;
         }
         let (min, max) = (e.min, e.max);
-        let full = [vec![min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)]];
+        let full = [rectangle(min, max).to_vec()];
         let (rings, parts) = match &e.cut {
             Some(cut) => (cut.rings.clone(), cut.parts.clone()),
             None => (full.to_vec(), full.to_vec()),
@@ -213,7 +213,7 @@ impl Facet {
         if area.is_nan() || area <= LEAST_SHARE * full_area {
             return None;
         }
-        let corners = [min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)];
+        let corners = rectangle(min, max);
         let [x0, y0, x1, y1] = cell;
         let keys = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]];
         let is_full = area >= full_area * (1.0 - LEAST_SHARE);

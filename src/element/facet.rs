@@ -74,9 +74,7 @@ impl Facet {
         let e = &self.elements[element as usize];
         match &e.cut {
             Some(cut) if cut.hull.len() >= 3 => cut.hull.iter().map(|&p| self.frame.lift(p)).collect(),
-            _ => [e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)]
-                .map(|p| self.frame.lift(p))
-                .to_vec(),
+            _ => e.corners().map(|p| self.frame.lift(p)).to_vec(),
         }
     }
 

@@ -23,6 +23,7 @@ pub use facet::{Facet, Sample, Side};
 
 use crate::cob::Cob;
 use crate::geom::Ring;
+use crate::geom::polygon::rectangle;
 
 /// Marks an absent parent or child.
 pub const NONE: u32 = u32::MAX;
@@ -83,6 +84,12 @@ impl Element {
     /// Its parts.
     pub fn children(&self) -> impl Iterator<Item = u32> + use<> {
         self.children.into_iter().filter(|&c| c != NONE)
+    }
+
+    /// The rectangle's corners, in the order of [`samples`](Self::samples).
+    #[must_use]
+    pub fn corners(&self) -> [DVec2; 4] {
+        rectangle(self.min, self.max)
     }
 
     /// The longer side, metres: the paper's size(i).

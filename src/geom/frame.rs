@@ -46,6 +46,14 @@ impl Frame {
         (point - self.origin).dot(self.normal)
     }
 
+    /// The direction that `(u, v)` of the unit square stands for, cosine-distributed about the normal: `u` turns
+    /// round it, `v` goes from it (0) to the plane (1).
+    #[must_use]
+    pub fn cosine_direction(&self, u: f64, v: f64) -> DVec3 {
+        let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
+        v.sqrt() * (cos * self.u + sin * self.v) + (1.0 - v).sqrt() * self.normal
+    }
+
     /// The same plane seen from behind: `v` and the normal turn round, so `lift` takes `(x, −y)`.
     #[must_use]
     pub fn flipped(&self) -> Self {

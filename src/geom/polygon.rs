@@ -6,6 +6,12 @@ use glam::DVec2;
 /// boundaries, clockwise ones holes.
 pub type Ring = Vec<DVec2>;
 
+/// The corners of the rectangle from `min` to `max`, counter-clockwise from `min`.
+#[must_use]
+pub fn rectangle(min: DVec2, max: DVec2) -> [DVec2; 4] {
+    [min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)]
+}
+
 /// Twice the signed area of triangle `a b c`; positive when counter-clockwise.
 #[must_use]
 pub fn orient(a: DVec2, b: DVec2, c: DVec2) -> f64 {

@@ -1,6 +1,6 @@
 //! The pictures of a bake: the page, and for each large surface its elements, buffers and triangles.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use super::{
     Cell, Colour, EMPTY, MeshDrawing, NOT_EMPTY, PictureError, ToneMap, UNINITIALIZED, lightmap_png,
@@ -70,7 +70,7 @@ fn elements(facets: &[&Facet], colour: impl Fn(&Facet, u32) -> Colour) -> MeshDr
             let e = &facet.elements[leaf as usize];
             let corners = match &e.cut {
                 Some(cut) => cut.hull.clone(),
-                None => vec![e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)],
+                None => e.corners().to_vec(),
             };
             cells.push(Cell { corners, fill: colour(facet, leaf) });
         }

@@ -43,8 +43,8 @@ pub(super) fn outlook(surface: &Surface, region: &Region, tracer: &Tracer) -> Ou
         let frame = Frame::new(from, surface.frame.normal, surface.frame.u);
         for k in 0..DIRECTIONS {
             all += 1;
-            if let Some(hit) = tracer.closest_hit(from, cosine_direction(&frame, k)) {
-                let is_back = hit.from_behind && !tracer.is_double_sided(hit.triangle);
+            if let Some(hit) = tracer.closest_hit(from, spiral_direction(&frame, k)) {
+                let is_back = tracer.met_back(&hit);
                 backs += u32::from(is_back);
                 near += u32::from(is_back || hit.distance < NARROW * tracer.diagonal());
             }
@@ -59,10 +59,8 @@ pub(super) fn outlook(surface: &Surface, region: &Region, tracer: &Tracer) -> Ou
     }
 }
 
-/// The `k`-th of [`DIRECTIONS`] directions, cosine-distributed on a golden spiral.
-fn cosine_direction(frame: &Frame, k: u32) -> DVec3 {
+/// The `k`-th of [`DIRECTIONS`] directions, on a golden spiral.
+fn spiral_direction(frame: &Frame, k: u32) -> DVec3 {
     const GOLDEN: f64 = 0.618_033_988_749_895;
-    let v = (f64::from(k) + 0.5) / f64::from(DIRECTIONS);
-    let (sin, cos) = (std::f64::consts::TAU * GOLDEN * f64::from(k)).sin_cos();
-    v.sqrt() * (cos * frame.u + sin * frame.v) + (1.0 - v).sqrt() * frame.normal
+    frame.cosine_direction(GOLDEN * f64::from(k), (f64::from(k) + 0.5) / f64::from(DIRECTIONS))
 }

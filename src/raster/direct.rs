@@ -13,9 +13,8 @@ use glam::{DAffine2, DVec2, DVec3};
 use super::cover::{Cover, Covering, neighbours, take_after_neighbours};
 use super::coverage::TexelSite;
 use super::fit::{FitTexel, LightSample, fit};
-
 use crate::geom::Frame;
-use crate::geom::polygon::contains;
+use crate::geom::polygon::{contains, rectangle};
 use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
@@ -229,7 +228,7 @@ impl Shining<'_> {
         let (low, high) = self.surface.extent();
         let (min, max) = ((min - reach).max(low) - least, (max + reach).min(high) + least);
         let frame: &Frame = &self.surface.frame;
-        [min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)].map(|p| frame.lift(p))
+        rectangle(min, max).map(|p| frame.lift(p))
     }
 
     /// A block that nothing shades.

@@ -55,9 +55,7 @@ fn leaf_points(facets: &[&Facet]) -> Vec<DVec2> {
         for leaf in facet.leaves() {
             let e = &facet.elements[leaf as usize];
             match &e.cut {
-                None => {
-                    points.extend([e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)]);
-                }
+                None => points.extend(e.corners()),
                 Some(cut) => points.extend(cut.rings.iter().flatten()),
             }
         }

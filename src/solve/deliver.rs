@@ -1,6 +1,7 @@
 //! What the patches send in the end reaches the elements.
 //!
-//! Each patch delivers once, all that it reflected, strongest first. A weak delivery was
+//! Each patch delivers all that it reflected, twice: first its mean, to learn how light varies over the
+//! patches, then what its elements received. A weak delivery was
 //! found well enough when the patches exchanged light, and the receiving patch keeps it. A
 //! strong one is evaluated anew in the receiver's samples: closed form times visibility,
 //! with the parts of a near shooter sending each their own radiosity, and the parts of a
@@ -17,7 +18,7 @@ use super::emitter::{Between, Effort, Evaluation, Precision};
 use super::form_factor::{SurfacePoint, point_to_disk};
 use super::patches::Patches;
 use super::shooters::{Reflected, Shooter, Shooters};
-use crate::element::{Element, Facet, NONE, Side};
+use crate::element::{Facet, NONE, Side};
 use crate::light::luminance;
 use crate::options::Refine;
 
@@ -195,10 +196,12 @@ impl Delivery<'_> {
             }
             return;
         }
+        let polygons = self.pass.occluders.polygons(tracer, &between);
+        let standing = Between::of(&polygons);
         let change = if between.is_empty() { 0.5 * near * near } else { near.max(0.2) };
         let allowed = self.tolerance * self.reference;
         if luminance(s.radiosity) * most * change > allowed
-            && self.error_in_middle(element, shooter, &between) > allowed
+            && self.error_in_middle(element, shooter, standing) > allowed
             && self.part(element)
         {
             for child in self.facet.elements[element as usize].children {
@@ -208,19 +211,19 @@ impl Delivery<'_> {
             }
             return;
         }
-        self.take(element, shooter, &between);
+        self.take(element, shooter, standing);
     }
 
     /// How far the interpolation of what arrives in the samples is from what arrives in the middle; where
     /// something stands between, not less than a share of how much the samples differ.
-    fn error_in_middle(&mut self, element: u32, shooter: u32, between: &[u32]) -> f64 {
+    fn error_in_middle(&mut self, element: u32, shooter: u32, between: Between) -> f64 {
         let samples = self.facet.elements[element as usize].samples;
         let values = samples.map(|sample| self.value(sample, shooter, between));
         let middle = self.evaluate(self.facet.centre(element), shooter, between);
         let e = &self.facet.elements[element as usize];
         let interpolated = e.interpolate(&e.corner_values(values), e.centroid);
         let error = luminance((interpolated - middle).abs());
-        if between.is_empty() {
+        if matches!(between, Between::Nothing) {
             return error;
         }
         values.iter().map(|v| SHADOW_SHARE * luminance((*v - middle).abs())).fold(error, f64::max)
@@ -244,7 +247,7 @@ impl Delivery<'_> {
         false
     }
 
-    fn take(&mut self, element: u32, shooter: u32, between: &[u32]) {
+    fn take(&mut self, element: u32, shooter: u32, between: Between) {
         self.counts.strong += 1;
         let samples = self.facet.elements[element as usize].samples;
         let values = samples.map(|sample| self.value(sample, shooter, between));
@@ -255,7 +258,7 @@ impl Delivery<'_> {
         }
     }
 
-    fn value(&mut self, sample: u32, shooter: u32, between: &[u32]) -> DVec3 {
+    fn value(&mut self, sample: u32, shooter: u32, between: Between) -> DVec3 {
         let (known, value) = self.values[sample as usize];
         if known == shooter {
             return value;
@@ -265,10 +268,8 @@ impl Delivery<'_> {
         value
     }
 
-    fn evaluate(&mut self, point: SurfacePoint, shooter: u32, between: &[u32]) -> DVec3 {
+    fn evaluate(&mut self, point: SurfacePoint, shooter: u32, between: Between) -> DVec3 {
         let s: &Shooter = &self.shooters.all[shooter as usize];
-        let polygons = self.pass.occluders.polygons(self.pass.tracer, between);
-        let between = if polygons.is_empty() { Between::Nothing } else { Between::Polygons(&polygons) };
         s.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation)
     }
 }
@@ -280,12 +281,11 @@ pub fn spread_kept(patches: &Patches, facets: &mut [Facet], grain: f64) {
         let cell = (facet.frame.lift(corner) / grain).round().as_i64vec3();
         (facet.surface, facet.region, facet.side == Side::Front, cell.to_array())
     };
-    let corners = |e: &Element| [e.min, DVec2::new(e.max.x, e.min.y), e.max, DVec2::new(e.min.x, e.max.y)];
     let mut sums: HashMap<_, (DVec3, f64)> = HashMap::new();
     for patch in &patches.patches {
         let facet = &facets[patch.facet as usize];
         let e = &facet.elements[patch.element as usize];
-        for corner in corners(e) {
+        for corner in e.corners() {
             let (sum, weight) = sums.entry(key(facet, corner)).or_default();
             *sum += e.kept * e.area;
             *weight += e.area;
@@ -293,7 +293,7 @@ pub fn spread_kept(patches: &Patches, facets: &mut [Facet], grain: f64) {
     }
     for patch in &patches.patches {
         let facet = &mut facets[patch.facet as usize];
-        let at = corners(&facet.elements[patch.element as usize]).map(|c| key(facet, c));
+        let at = facet.elements[patch.element as usize].corners().map(|c| key(facet, c));
         let e = &mut facet.elements[patch.element as usize];
         for (value, key) in e.indirect.iter_mut().zip(at) {
             if let Some(&(sum, weight)) = sums.get(&key) {

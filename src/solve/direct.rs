@@ -301,8 +301,7 @@ impl<'a> Receiving<'a> {
 
     fn evaluate(&mut self, point: super::form_factor::SurfacePoint, between: &[u32]) -> DVec3 {
         let polygons = self.pass.occluders.polygons(self.pass.tracer, between);
-        let between = if polygons.is_empty() { Between::Nothing } else { Between::Polygons(&polygons) };
-        self.emitter.irradiance(point, self.pass.tracer, between, &mut self.evaluation)
+        self.emitter.irradiance(point, self.pass.tracer, Between::of(&polygons), &mut self.evaluation)
     }
 }
 

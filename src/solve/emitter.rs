@@ -61,6 +61,14 @@ pub enum Between<'a> {
     Polygons(&'a [&'a [DVec3]]),
 }
 
+impl<'a> Between<'a> {
+    /// These polygons, or nothing where there are none.
+    #[must_use]
+    pub fn of(polygons: &'a [&'a [DVec3]]) -> Self {
+        if polygons.is_empty() { Self::Nothing } else { Self::Polygons(polygons) }
+    }
+}
+
 /// How much was evaluated which way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effort {

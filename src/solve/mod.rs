@@ -205,17 +205,18 @@ fn shoot_patches(
     let at_first = patches.unshot_power().element_sum();
     let enough = patches.energy.emitted.element_sum() * problem.options.unshot_fraction;
     loop {
-        let left = patches.unshot_power().element_sum();
+        patches.energy.unshot = patches.unshot_power();
+        let left = patches.energy.unshot.element_sum();
+        if left <= enough {
+            return Some(());
+        }
         // The logarithm falls evenly, since each round of shots absorbs about the same share.
         let done = (at_first / left).ln() / (at_first / enough).ln();
-        if left <= enough || !progress(0.4 + 0.3 * done.clamp(0.0, 1.0)) {
-            break if left <= enough { Some(()) } else { None };
+        if !progress(0.4 + 0.3 * done.clamp(0.0, 1.0)) {
+            return None;
         }
         if patches.shoot(problem.tracer).is_none() {
-            break Some(());
+            return Some(());
         }
-        patches.energy.unshot = patches.unshot_power();
-    }?;
-    patches.energy.unshot = patches.unshot_power();
-    Some(())
+    }
 }

@@ -303,13 +303,11 @@ impl Patch {
         for k in 0..HEMISPHERE_STRATA * HEMISPHERE_STRATA {
             let u = (f64::from(k % HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
             let v = (f64::from(k / HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
-            let (sin, cos) = (std::f64::consts::TAU * u).sin_cos();
-            let direction = v.sqrt() * (cos * frame.u + sin * frame.v) + (1.0 - v).sqrt() * frame.normal;
             // Neighbouring strata start from different points.
             let point = self.points[((k + 2 * (k / HEMISPHERE_STRATA)) % 4) as usize];
-            match tracer.closest_hit(point, direction) {
+            match tracer.closest_hit(point, frame.cosine_direction(u, v)) {
                 None => escaping += 1,
-                Some(hit) if hit.from_behind && !tracer.is_double_sided(hit.triangle) => behind += 1,
+                Some(hit) if tracer.met_back(&hit) => behind += 1,
                 Some(_) => {}
             }
         }
@@ -358,7 +356,7 @@ fn exchange(a: &Patch, b: &Patch, tracer: &Tracer) -> (f64, u64) {
     (f * receiver.area * seen, rays)
 }
 
-/// The kernel-weighted share of point pairs in sight: each point of one with two of the other.
+/// The kernel-weighted share of point pairs in sight: each point of one with one of the other.
 fn seen_pairs(receiver: &Patch, shooter: &Patch, tracer: &Tracer) -> (f64, u64) {
     let (mut seen, mut all, mut rays) = (0.0, 0.0, 0);
     for (i, &p) in receiver.points.iter().enumerate() {

@@ -112,6 +112,12 @@ impl Tracer {
         &self.triangles
     }
 
+    /// Whether a hit met a back that is no surface: that of a single-sided triangle.
+    #[must_use]
+    pub fn met_back(&self, hit: &Hit) -> bool {
+        hit.from_behind && !self.is_double_sided(hit.triangle)
+    }
+
     /// The scene's diagonal, metres.
     #[must_use]
     pub fn diagonal(&self) -> f64 {
