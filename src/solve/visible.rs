@@ -302,6 +302,9 @@ mod tests {
         let whole = point_to_polygon(receiver, &parts[0]);
         let c = |x, y| DVec3::new(x, y, 2.0 - 1e-12);
         let around = [[c(1.0, -3.0), c(3.0, 3.0), c(3.0, -3.0)], [c(1.0, -3.0), c(1.0, 3.0), c(3.0, 3.0)]];
+        // The lamp's own triangles are among them when a shaft has no cap.
+        let own = [[c(-1.0, -1.0), c(-1.0, 1.0), c(1.0, 1.0)], [c(-1.0, -1.0), c(1.0, 1.0), c(1.0, -1.0)]];
+        let around = [around, own].concat();
         let mut workspace = Workspace::default();
         let seen = visible_form_factor(receiver, looking_up(&parts), polygons(&around), &mut workspace);
         assert!((seen.unwrap() - whole).abs() < EXACT && whole > 0.0);
