@@ -76,7 +76,7 @@ pub(super) fn fill_report(report: &mut Report, scene: &Scene, surfaces: &[Surfac
             as u64;
     report.elements.at_end = leaf_count(&solution.facets);
     report.elements.splits.cob = solution.direct.cob_splits;
-    report.elements.splits.gradient = solution.direct.gradient_splits + solution.delivery.splits;
+    report.elements.splits.gradient = solution.direct.gradient_splits + solution.gathering.splits;
     report.elements.splits.uniform = solution.direct.uniform_splits;
     for facet in &solution.facets {
         for element in &facet.elements {

@@ -250,7 +250,6 @@ impl Facet {
             cob: Cob::UNINITIALIZED,
             direct: [DVec3::ZERO; 4],
             indirect: [DVec3::ZERO; 4],
-            kept: DVec3::ZERO,
         });
         Some((self.elements.len() - 1) as u32)
     }

@@ -57,8 +57,6 @@ pub struct Element {
     pub direct: [DVec3; 4],
     /// Indirect irradiance that it received itself, in the corners.
     pub indirect: [DVec3; 4],
-    /// Indirect irradiance known only as a mean over this patch, until it is spread over the corners.
-    pub kept: DVec3,
 }
 
 /// What the outline leaves of an element's rectangle.

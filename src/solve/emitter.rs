@@ -26,8 +26,6 @@ impl Precision {
     pub const EMITTER: Self = Self { exact_occluders: 32, rays_a_side: 8 };
     /// For emitters seen from several points of one texel.
     pub const TEXEL: Self = Self { exact_occluders: 32, rays_a_side: 4 };
-    /// For reflectors: many, each weak.
-    pub const REFLECTOR: Self = Self { exact_occluders: 4, rays_a_side: 3 };
 }
 
 /// A glowing planar polygon of uniform radiance, one side of it.
@@ -195,14 +193,14 @@ impl AreaEmitter {
     }
 }
 
-fn fan_area(part: &[DVec3]) -> f64 {
+pub(super) fn fan_area(part: &[DVec3]) -> f64 {
     (1..part.len().saturating_sub(1))
         .map(|i| crate::geom::triangle::area([part[0], part[i], part[i + 1]]))
         .sum()
 }
 
 /// Maps the unit square onto a convex polygon, area for area.
-fn point_in_fan(part: &[DVec3], u: f64, v: f64) -> DVec3 {
+pub(super) fn point_in_fan(part: &[DVec3], u: f64, v: f64) -> DVec3 {
     let mut target = u * fan_area(part);
     let last = part.len() - 2;
     for i in 1..=last {

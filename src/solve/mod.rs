@@ -4,14 +4,17 @@
 //! punctual lights, both onto elements that split where their shadows fall ([`direct`]).
 //! Then patches shoot what they reflect among each other ([`patches`]), the one with the
 //! most unshot power first, until the unshot power is a small fraction of the emitted; and
-//! what each sent is delivered once to the elements ([`mod@deliver`]).
+//! what all reflect in the end is gathered by the elements ([`mod@gather`]).
 
-pub mod deliver;
 pub mod direct;
 pub mod emitter;
+pub mod exchange;
+pub mod field;
 pub mod form_factor;
+pub mod gather;
+pub mod locate;
 pub mod patches;
-pub mod shooters;
+pub mod sequence;
 pub mod umbra;
 pub mod visible;
 
@@ -23,15 +26,13 @@ use crate::options::BakeOptions;
 use crate::scene::PunctualLight;
 use crate::surface::Surface;
 use crate::trace::Tracer;
-use deliver::{DeliveryCounts, deliver, spread_kept};
 use direct::{DirectPass, ShotCounts};
 use emitter::{AreaEmitter, Emitter};
+use field::RadiosityField;
+use gather::{GatherCounts, Round, gather};
+use locate::FacetLocator;
 use patches::{Energy, Patches};
-use shooters::{Reflected, Shooters};
 use umbra::Occluders;
-
-/// What was delivered is scaled by no more than this.
-const MOST_BALANCING: f64 = 1.25;
 
 /// What the solver works on.
 pub struct Problem<'a> {
@@ -71,8 +72,8 @@ pub struct Solution {
     pub rays: u64,
     /// What the direct pass did.
     pub direct: ShotCounts,
-    /// What delivering reflected light did.
-    pub delivery: DeliveryCounts,
+    /// What gathering reflected light did.
+    pub gathering: GatherCounts,
 }
 
 /// Solves for the light on `facets`.
@@ -96,7 +97,8 @@ pub fn solve(
         typical: typical_irradiance(&glowing, &lights, &facets, tracer.diagonal()),
     };
     let mut direct = ShotCounts::default();
-    let mut patches = Patches::new(&facets, problem.patch_size, tracer);
+    let locator = FacetLocator::new(problem.surfaces, &facets, tracer.triangles().len());
+    let mut patches = Patches::new(&facets, problem.patch_size, &locator, tracer);
     let count = glowing.len() + lights.len();
     let mut before = mean_direct(&patches, &facets);
     for (i, emitter) in glowing.iter().chain(&lights).enumerate() {
@@ -119,16 +121,16 @@ pub fn solve(
         patches.receive_from_lights(&received);
     }
     shoot_patches(&mut patches, problem, progress)?;
-    tracing::debug!(shots = patches.shots, rays = patches.rays, patches = patches.patches.len(), "patches");
+    tracing::debug!(shots = patches.shots, rays = patches.rays(), patches = patches.patches.len(), "patches");
     pass.typical = patches.mean_irradiance();
-    let mut delivery = DeliveryCounts::default();
-    for (round, reflected) in [Reflected::ByPatch, Reflected::ByElement].into_iter().enumerate() {
-        let shooters = Shooters::new(&facets, &patches, reflected);
-        delivery.add(&deliver(&pass, &patches, &shooters, &mut facets));
-        tracing::debug!(?delivery, "delivered");
-        spread_kept(&patches, &mut facets, tracer.diagonal() * 1e-6);
-        balance(&patches, &mut facets);
-        if !progress(0.85 + 0.15 * round as f64) {
+    patches.spread_indirect(&mut facets, tracer.diagonal() * 1e-6);
+    let elements = patches.elements_by_facet(facets.len());
+    let mut gathering = GatherCounts::default();
+    for (i, round) in [Round::FIRST, Round::LAST].into_iter().enumerate() {
+        let field = RadiosityField::new(&locator, &facets);
+        gathering.add(&gather(&pass, &field, &elements, round, &mut facets));
+        tracing::debug!(?gathering, "gathered");
+        if !progress(0.85 + 0.15 * i as f64) {
             return None;
         }
     }
@@ -138,27 +140,12 @@ pub fn solve(
         typical: patches.mean_irradiance(),
         energy: patches.energy,
         shots: emitters.len() as u64 + patches.shots,
-        rays: patches.rays + direct.effort.rays + delivery.effort.rays,
+        rays: patches.rays() + direct.effort.rays + gathering.rays,
         emitters,
         occluders,
         direct,
-        delivery,
+        gathering,
     })
-}
-
-/// Scales what was delivered so that as much light arrives in all as the patches exchanged, whose energy
-/// is in balance; the quadrature in elements makes or loses about one part in a hundred.
-fn balance(patches: &Patches, facets: &mut [Facet]) {
-    let (mut exchanged, mut delivered) = (DVec3::ZERO, DVec3::ZERO);
-    for patch in &patches.patches {
-        exchanged += patch.indirect * patch.area;
-        delivered += facets[patch.facet as usize].mean(patch.element).1 * patch.area;
-    }
-    let scale = DVec3::select(delivered.cmpgt(DVec3::ZERO), exchanged / delivered, DVec3::ONE)
-        .clamp(DVec3::splat(1.0 / MOST_BALANCING), DVec3::splat(MOST_BALANCING));
-    for element in facets.iter_mut().flat_map(|f| &mut f.elements) {
-        element.indirect.iter_mut().for_each(|e| *e *= scale);
-    }
 }
 
 /// Glowing regions and punctual lights, each the strongest first; ties keep the scene's order.
@@ -215,7 +202,7 @@ fn shoot_patches(
         if !progress(0.4 + 0.3 * done.clamp(0.0, 1.0)) {
             return None;
         }
-        if patches.shoot(problem.tracer).is_none() {
+        if patches.shoot().is_none() {
             return Some(());
         }
     }

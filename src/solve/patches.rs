@@ -2,36 +2,19 @@
 //!
 //! Patches are few and coarse; they shoot and receive until little is left unshot (Cohen,
 //! Chen, Wallace, Greenberg, "A Progressive Refinement Approach to Fast Radiosity Image
-//! Generation", 1988). Each pair's exchange factor is found once, when one of the two first
-//! shoots, and serves both by reciprocity. What patches send in the end is delivered to the
-//! elements by [`deliver`](mod@super::deliver).
-//!
-//! Exchange factors come from closed forms in few points, so a patch's row does not sum
-//! exactly to what leaves it. A fixed set of cosine-distributed rays says which share
-//! escapes and which meets backs, and the row is scaled to the rest: no energy is made or
-//! lost by quadrature.
+//! Generation", 1988). What pairs exchange is in [`exchange`](super::exchange). What the
+//! patches reflect in the end is gathered by the elements, in [`gather`](mod@super::gather).
 
-use glam::DVec3;
-use rayon::prelude::*;
+use std::collections::HashMap;
 
-use super::emitter::AreaEmitter;
-use super::form_factor::{SurfacePoint, point_to_disk};
-use crate::element::{Element, Facet};
+use glam::{DVec2, DVec3};
+
+use super::exchange::Exchange;
+use super::locate::FacetLocator;
+use crate::element::{Element, Facet, Side};
 use crate::trace::Tracer;
 
-/// Rays that tell what leaves the scene: a square of strata of the hemisphere, this many a side.
-const HEMISPHERE_STRATA: u32 = 16;
-
-/// Beyond this many radii of the larger patch, centres stand for patches.
-const FAR: f64 = 6.0;
-
-/// Factors below this are found with one shadow ray.
-const WEAK_FACTOR: f64 = 2e-4;
-
-/// Factors below this, the larger of a pair's two, are left out; the row's scaling makes up for them.
-const NEGLIGIBLE_FACTOR: f64 = 2e-6;
-
-/// A row is scaled by no more than this to close its energy balance.
+/// What emitters sent is scaled by no more than this to close the energy balance.
 const MOST_SCALING: f64 = 2.0;
 
 /// A patch: an element that shoots.
@@ -41,14 +24,6 @@ pub struct Patch {
     pub facet: u32,
     /// Index of its element there.
     pub element: u32,
-    /// Its shape.
-    shape: AreaEmitter,
-    /// Its centre, lifted off the surface.
-    pub centre: SurfacePoint,
-    /// Four points that stand for its area, lifted.
-    points: [DVec3; 4],
-    /// From the centre to the farthest corner, metres.
-    pub radius: f64,
     /// Square metres.
     pub area: f64,
     /// Diffuse reflectance.
@@ -58,9 +33,6 @@ pub struct Patch {
     /// Irradiance reflected at least once.
     pub indirect: DVec3,
     unshot: DVec3,
-    /// Shares of what it sends that leave the scene, and that meet backs.
-    escaping: f64,
-    onto_backs: f64,
 }
 
 /// Power per channel: where the light went.
@@ -76,33 +48,21 @@ pub struct Energy {
     pub unshot: DVec3,
 }
 
-/// What one patch exchanges with all.
-struct Row {
-    /// `A_i F_ij`, as the quadrature has it: the same seen from either patch.
-    factors: Box<[f32]>,
-    /// What the factors are multiplied by so that all of the light arrives that neither escapes nor meets
-    /// a back.
-    scale: f64,
-}
-
 /// The patches and what they exchange.
 pub struct Patches {
     /// All patches, in the order of facets.
     pub patches: Vec<Patch>,
-    /// `A_i F_ij` for patches `i` that have shot.
-    rows: Vec<Option<Row>>,
+    exchange: Exchange,
     /// Where the light went.
     pub energy: Energy,
     /// Reflected shots so far.
     pub shots: u64,
-    /// Rays so far.
-    pub rays: u64,
 }
 
 impl Patches {
     /// Makes patches from the facets' elements that are largest but no larger than `patch_size`.
     #[must_use]
-    pub fn new(facets: &[Facet], patch_size: f64, tracer: &Tracer) -> Self {
+    pub fn new(facets: &[Facet], patch_size: f64, locator: &FacetLocator, tracer: &Tracer) -> Self {
         let mut patches = Vec::new();
         for (index, facet) in facets.iter().enumerate() {
             let mut stack = vec![0];
@@ -111,28 +71,38 @@ impl Patches {
                 if e.size() > patch_size * (1.0 + 1e-9) && !e.is_leaf() {
                     stack.extend(e.children().collect::<Vec<_>>().into_iter().rev());
                 } else {
-                    patches.push(Patch::new(index as u32, facet, element));
+                    patches.push(Patch::new(index as u32, element, e));
                 }
             }
         }
-        let rays = AtomicCount::default();
-        patches.par_iter_mut().for_each(|p| {
-            (p.escaping, p.onto_backs) = p.losses(tracer);
-            rays.add(u64::from(HEMISPHERE_STRATA * HEMISPHERE_STRATA));
-        });
-        let rows = (0..patches.len()).map(|_| None).collect();
-        Self { patches, rows, energy: Energy::default(), shots: 0, rays: rays.get() }
+        let exchange = Exchange::new(facets, &patches, locator, tracer, patch_size * patch_size);
+        Self { patches, exchange, energy: Energy::default(), shots: 0 }
+    }
+
+    /// Rays that were cast to know what patches exchange.
+    #[must_use]
+    pub fn rays(&self) -> u64 {
+        self.exchange.rays
+    }
+
+    /// The patches' elements, for each of as many facets.
+    #[must_use]
+    pub fn elements_by_facet(&self, facets: usize) -> Vec<Vec<u32>> {
+        let mut elements = vec![Vec::new(); facets];
+        self.patches.iter().for_each(|p| elements[p.facet as usize].push(p.element));
+        elements
     }
 
     /// Takes in what glowing surfaces sent straight to each patch, scaled so that as much arrives as was
     /// sent and neither escaped nor met a back.
     pub fn receive_from_surfaces(&mut self, facets: &[Facet], received: &[DVec3]) {
         let (mut emitted, mut escaped, mut onto_backs) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
-        for patch in &self.patches {
+        for (index, patch) in self.patches.iter().enumerate() {
             let power = facets[patch.facet as usize].exitance * patch.area;
+            let losses = self.exchange.losses(index);
             emitted += power;
-            escaped += power * patch.escaping;
-            onto_backs += power * patch.onto_backs;
+            escaped += power * losses.0;
+            onto_backs += power * losses.1;
         }
         let arriving: DVec3 = self.patches.iter().zip(received).map(|(p, &e)| e * p.area).sum();
         let expected = emitted - escaped - onto_backs;
@@ -177,7 +147,7 @@ impl Patches {
     }
 
     /// The patch with the most unshot power shoots all of it. Its power, or `None` where none is left.
-    pub fn shoot(&mut self, tracer: &Tracer) -> Option<DVec3> {
+    pub fn shoot(&mut self) -> Option<DVec3> {
         let power = |p: &Patch| (p.unshot * p.area).element_sum();
         let (shooter, _) = self
             .patches
@@ -186,191 +156,60 @@ impl Patches {
             .map(|(i, p)| (i, power(p)))
             .filter(|&(_, w)| w > 0.0)
             .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
-        if self.rows[shooter].is_none() {
-            self.rows[shooter] = Some(self.row(shooter, tracer));
-        }
-        let row = self.rows[shooter].as_ref()?;
         let patch = &mut self.patches[shooter];
-        let shot = std::mem::take(&mut patch.unshot) * patch.area;
-        let (escaping, onto_backs) = (patch.escaping, patch.onto_backs);
-        let factor = shot / patch.area * row.scale;
+        let radiosity = std::mem::take(&mut patch.unshot);
+        let shot = radiosity * patch.area;
         let mut absorbed = DVec3::ZERO;
-        for (receiver, &g) in self.patches.iter_mut().zip(&row.factors) {
-            if g > 0.0 {
-                let arrived = factor * f64::from(g);
-                let reflected = arrived * receiver.reflectance;
-                receiver.indirect += arrived / receiver.area;
-                receiver.unshot += reflected / receiver.area;
-                absorbed += arrived - reflected;
-            }
+        for (receiver, g) in self.exchange.received(shooter) {
+            let receiver = &mut self.patches[receiver];
+            let arrived = radiosity * g;
+            let reflected = arrived * receiver.reflectance;
+            receiver.indirect += arrived / receiver.area;
+            receiver.unshot += reflected / receiver.area;
+            absorbed += arrived - reflected;
         }
+        let (escaping, onto_backs) = self.exchange.losses(shooter);
         self.energy.absorbed += absorbed + shot * onto_backs;
         self.energy.escaped += shot * escaping;
         self.shots += 1;
         Some(shot)
     }
 
-    /// The exchange factors of one patch with all.
-    fn row(&mut self, shooter: usize, tracer: &Tracer) -> Row {
-        let rays = AtomicCount::default();
-        let (patches, rows) = (&self.patches, &self.rows);
-        let factors: Vec<f32> = (0..patches.len())
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|other| match &rows[other] {
-                Some(known) => known.factors[shooter],
-                None if other == shooter => 0.0,
-                None => {
-                    let (g, cast) = exchange(&patches[shooter], &patches[other], tracer);
-                    rays.add(cast);
-                    g as f32
-                }
-            })
-            .collect();
-        self.rays += rays.get();
-        let patch = &self.patches[shooter];
-        let sum = factors.iter().map(|&g| f64::from(g)).sum::<f64>() / patch.area;
-        let arriving = 1.0 - patch.escaping - patch.onto_backs;
-        let scale = if sum > 0.0 { (arriving / sum).clamp(1.0 / MOST_SCALING, MOST_SCALING) } else { 0.0 };
-        Row { factors: factors.into_boxed_slice(), scale }
-    }
-
-    /// The irradiance that patch `shooter` gives patch `receiver` for each unit of its radiosity; 0 where
-    /// neither has shot.
-    #[must_use]
-    pub fn factor(&self, shooter: usize, receiver: usize) -> f64 {
-        let g = match (&self.rows[shooter], &self.rows[receiver]) {
-            (Some(row), _) => f64::from(row.factors[receiver]) * row.scale,
-            (None, Some(row)) => f64::from(row.factors[shooter]) * row.scale,
-            (None, None) => 0.0,
+    /// Writes what patches received by reflection into their elements, continuous where it was constant: a
+    /// corner takes the mean of the patches of its region that meet there, no more than `grain` metres apart.
+    pub fn spread_indirect(&self, facets: &mut [Facet], grain: f64) {
+        let key = |facet: &Facet, corner: DVec2| {
+            let cell = (facet.frame.lift(corner) / grain).round().as_i64vec3();
+            (facet.surface, facet.region, facet.side == Side::Front, cell.to_array())
         };
-        g / self.patches[receiver].area
-    }
-}
-
-/// A counter for parallel loops: integer sums do not depend on the schedule.
-#[derive(Default)]
-struct AtomicCount(std::sync::atomic::AtomicU64);
-
-impl AtomicCount {
-    fn add(&self, n: u64) {
-        self.0.fetch_add(n, std::sync::atomic::Ordering::Relaxed);
-    }
-
-    fn get(&self) -> u64 {
-        self.0.load(std::sync::atomic::Ordering::Relaxed)
+        let mut sums: HashMap<_, (DVec3, f64)> = HashMap::new();
+        for patch in &self.patches {
+            let facet = &facets[patch.facet as usize];
+            for corner in facet.elements[patch.element as usize].corners() {
+                let (sum, weight) = sums.entry(key(facet, corner)).or_default();
+                *sum += patch.indirect * patch.area;
+                *weight += patch.area;
+            }
+        }
+        for patch in &self.patches {
+            let facet = &mut facets[patch.facet as usize];
+            let corners = facet.elements[patch.element as usize].corners();
+            let means = corners.map(|c| sums.get(&key(facet, c)).map_or(patch.indirect, |(sum, w)| *sum / *w));
+            facet.elements[patch.element as usize].indirect = means;
+        }
     }
 }
 
 impl Patch {
-    fn new(facet_index: u32, facet: &Facet, element: u32) -> Self {
-        let e: &Element = &facet.elements[element as usize];
-        let parts = facet.parts(element);
-        let centre = facet.centre(element);
-        // Gauss's points of a rectangle: 1/√3 of the way to its corners. A concave outline may leave the
-        // sample itself only.
-        let points = e.samples.map(|s| {
-            let sample = &facet.samples[s as usize];
-            let inner = e.centroid.lerp(sample.position, 0.577);
-            if facet.contains(element, inner) {
-                centre.position.lerp(sample.point.position, 0.577)
-            } else {
-                sample.point.position
-            }
-        });
-        let radius = parts.iter().flatten().map(|p| p.distance(centre.position)).fold(0.0, f64::max);
+    fn new(facet: u32, element: u32, e: &Element) -> Self {
         Self {
-            facet: facet_index,
+            facet,
             element,
-            shape: AreaEmitter::new(facet.frame, parts, e.area, DVec3::ONE),
-            centre,
-            points,
-            radius,
             area: e.area,
             reflectance: e.reflectance,
             direct: DVec3::ZERO,
             indirect: DVec3::ZERO,
             unshot: DVec3::ZERO,
-            escaping: 0.0,
-            onto_backs: 0.0,
         }
     }
-
-    /// Shares of its light that leave the scene and that meet the backs of single-sided surfaces.
-    fn losses(&self, tracer: &Tracer) -> (f64, f64) {
-        let frame = crate::geom::Frame::new(self.centre.position, self.centre.normal, DVec3::X);
-        let (mut escaping, mut behind) = (0_u32, 0_u32);
-        for k in 0..HEMISPHERE_STRATA * HEMISPHERE_STRATA {
-            let u = (f64::from(k % HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
-            let v = (f64::from(k / HEMISPHERE_STRATA) + 0.5) / f64::from(HEMISPHERE_STRATA);
-            // Neighbouring strata start from different points.
-            let point = self.points[((k + 2 * (k / HEMISPHERE_STRATA)) % 4) as usize];
-            match tracer.closest_hit(point, frame.cosine_direction(u, v)) {
-                None => escaping += 1,
-                Some(hit) if tracer.met_back(&hit) => behind += 1,
-                Some(_) => {}
-            }
-        }
-        let all = f64::from(HEMISPHERE_STRATA * HEMISPHERE_STRATA);
-        (f64::from(escaping) / all, f64::from(behind) / all)
-    }
-}
-
-/// `A_i F_ij = A_j F_ji` past what stands between, and the number of rays it took.
-fn exchange(a: &Patch, b: &Patch, tracer: &Tracer) -> (f64, u64) {
-    let d = b.centre.position - a.centre.position;
-    let (height_b, height_a) = (a.centre.normal.dot(d), -b.centre.normal.dot(d));
-    if height_b <= -b.radius || height_a <= -a.radius {
-        return (0.0, 0);
-    }
-    // The smaller one receives: its few points stand for it better.
-    let (receiver, shooter) = if a.area <= b.area { (a, b) } else { (b, a) };
-    let distance = d.length();
-    if distance > FAR * a.radius.max(b.radius) {
-        let f = if shooter.area < 0.01 * distance * distance {
-            point_to_disk(receiver.centre, shooter.centre.position, shooter.centre.normal, shooter.area)
-        } else {
-            shooter.shape.unoccluded(receiver.centre)
-        };
-        if f < NEGLIGIBLE_FACTOR {
-            return (0.0, 0);
-        }
-        if f < WEAK_FACTOR {
-            let hidden = tracer.occluded(receiver.centre.position, shooter.centre.position);
-            return (if hidden { 0.0 } else { f * receiver.area }, 1);
-        }
-        let (seen, rays) = seen_pairs(receiver, shooter, tracer);
-        return (f * receiver.area * seen, rays);
-    }
-    let normal = receiver.centre.normal;
-    let f: f64 = receiver
-        .points
-        .iter()
-        .map(|&position| shooter.shape.unoccluded(SurfacePoint { position, normal }))
-        .sum::<f64>()
-        / 4.0;
-    if f <= 0.0 {
-        return (0.0, 0);
-    }
-    let (seen, rays) = seen_pairs(receiver, shooter, tracer);
-    (f * receiver.area * seen, rays)
-}
-
-/// The kernel-weighted share of point pairs in sight: each point of one with one of the other.
-fn seen_pairs(receiver: &Patch, shooter: &Patch, tracer: &Tracer) -> (f64, u64) {
-    let (mut seen, mut all, mut rays) = (0.0, 0.0, 0);
-    for (i, &p) in receiver.points.iter().enumerate() {
-        let q = shooter.points[(i * 3 + 1) % 4];
-        let d = q - p;
-        let weight = receiver.centre.normal.dot(d).max(0.0) * (-shooter.centre.normal.dot(d)).max(0.0)
-            / d.length_squared().powi(2).max(f64::MIN_POSITIVE);
-        if weight > 0.0 {
-            rays += 1;
-            all += weight;
-            if !tracer.occluded(p, q) {
-                seen += weight;
-            }
-        }
-    }
-    (if all > 0.0 { seen / all } else { 1.0 }, rays)
 }
