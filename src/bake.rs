@@ -96,7 +96,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
     let scale = Scale::of(&surfaces, options);
     let mesh_options =
-        MeshOptions { patch_size: scale.patch_size, nudge: NUDGE * tracer.diagonal(), lift: tracer.margin() };
+        MeshOptions { patch_size: scale.patch_size, nudge: (NUDGE * tracer.diagonal()).max(std::env::var("NUDGE").map_or(0.1,|x|x.parse().unwrap()) * scale.indirect_threshold), lift: tracer.margin() };
     let facets = build(&surfaces, &appearance, mesh_options);
     let initial = account::leaf_count(&facets);
 

@@ -157,7 +157,7 @@ impl Default for BakeOptions {
             illumination_threshold: 0.3,
             shaft_test: Toggle::On,
             umbra_test: Toggle::On,
-            unshot_fraction: 1e-3,
+            unshot_fraction: 1e-4,
             max_reflectance: 0.95,
             padding: None,
             scene: None,

@@ -157,13 +157,24 @@ impl Facet {
     /// Whether there are parts now: an element at the finest division stays whole.
     pub fn split(&mut self, element: u32, appearance: &dyn SurfaceAppearance) -> bool {
         let e = &self.elements[element as usize];
+        let size = e.max - e.min;
+        let columns = if size.x > 0.7 * size.y { 2 } else { 1 };
+        let rows = if size.y > 0.7 * size.x { 2 } else { 1 };
+        self.split_into(element, [columns, rows], appearance)
+    }
+
+    /// Splits a leaf into that many columns and rows, each 1 or 2. Returns as [`split`](Self::split).
+    pub fn split_into(
+        &mut self,
+        element: u32,
+        [columns, rows]: [u32; 2],
+        appearance: &dyn SurfaceAppearance,
+    ) -> bool {
+        let e = &self.elements[element as usize];
         if !e.is_leaf() {
             return true;
         }
         let [x0, y0, x1, y1] = e.cell;
-        let size = e.max - e.min;
-        let columns = if size.x > 0.7 * size.y { 2 } else { 1 };
-        let rows = if size.y > 0.7 * size.x { 2 } else { 1 };
         if (columns == 2 && x1 - x0 < 2) || (rows == 2 && y1 - y0 < 2) {
             return false;
         }

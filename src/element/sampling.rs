@@ -19,7 +19,10 @@ impl Facet {
         if let Some(&sample) = self.lattice.get(&key) {
             return sample;
         }
-        let sample = self.add_sample(toward(corner, inside, self.nudge));
+        // As far along both axes, so that it comes off walls at slender elements' feet, too.
+        let d = inside - corner;
+        let step = d.signum() * (0.5 * d.abs()).min(DVec2::splat(self.nudge));
+        let sample = self.add_sample(corner + step);
         self.lattice.insert(key, sample);
         sample
     }

@@ -27,10 +27,10 @@ struct BilinearPatch {
 }
 
 impl<'a> RadiosityField<'a> {
-    /// Takes down what `facets` received.
+    /// Takes down what `facets` received, their direct light times `direct_scale`.
     #[must_use]
-    pub fn new(locator: &'a FacetLocator, facets: &[Facet]) -> Self {
-        let facets = facets.par_iter().map(FacetField::new).collect();
+    pub fn new(locator: &'a FacetLocator, facets: &[Facet], direct_scale: DVec3) -> Self {
+        let facets = facets.par_iter().map(|facet| FacetField::new(facet, direct_scale)).collect();
         Self { locator, facets }
     }
 
@@ -46,13 +46,13 @@ impl<'a> RadiosityField<'a> {
 }
 
 impl FacetField {
-    fn new(facet: &Facet) -> Self {
+    fn new(facet: &Facet, direct_scale: DVec3) -> Self {
         let mut patches = vec![BilinearPatch::default(); facet.elements.len()];
         for leaf in facet.leaves() {
             let e = &facet.elements[leaf as usize];
             let radiosity = |corner| {
                 let (direct, indirect) = facet.received(leaf, corner);
-                (e.reflectance * (direct + indirect)).as_vec3()
+                (e.reflectance * (direct * direct_scale + indirect)).as_vec3()
             };
             patches[leaf as usize] = BilinearPatch {
                 min: e.min,

@@ -14,7 +14,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::direct::DirectPass;
@@ -52,7 +52,13 @@ const LEAST_REFERENCE: f64 = 0.25;
 
 /// Where surfaces are nearer than the element is large, this share of the difference between the samples and
 /// the middle counts as error: the interpolation of an edge can be right in the middle by chance.
-const NEAR_SHARE: f64 = 0.15;
+#[allow(dead_code)] const NEAR_SHARE: f64 = 0.15;
+
+/// Light that changes this many times more along one axis than along the other changes along that one.
+const CLEARLY: f64 = 2.0;
+
+/// No element becomes this many times longer than wide by being split across.
+const MOST_SLENDER: f64 = 32.0;
 
 /// What gathering took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -145,13 +151,13 @@ impl Gathering<'_> {
             let e = &self.facet.elements[element as usize];
             let interpolated = e.interpolate(&e.corner_values(values), e.centroid);
             let mut error = luminance((interpolated - middle.irradiance).abs());
-            if middle.distance < 2.0 * size {
+            if middle.distance < par(6) * size {
                 let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
-                error = differences.map(|d| NEAR_SHARE * d).fold(error, f64::max);
+                error = differences.map(|d| par(4) * d).fold(error, f64::max);
             }
             let (direct, _) = self.facet.received(element, e.centroid);
-            let light = luminance(direct + middle.irradiance).max(LEAST_REFERENCE * self.pass.typical);
-            if error > self.round.tolerance * light && self.part(element) {
+            let light = luminance(direct + middle.irradiance).max(par(5) * self.pass.typical);
+            if error > self.tol() * light && self.part(element, values) {
                 self.hand_down(element, middle);
                 for child in self.facet.elements[element as usize].children {
                     if child != NONE {
@@ -175,11 +181,28 @@ impl Gathering<'_> {
     }
 
     /// Whether the element has parts now.
-    fn part(&mut self, element: u32) -> bool {
-        if !self.facet.elements[element as usize].is_leaf() {
+    ///
+    /// A leaf is split across the direction in which the light in its corners changes most: slender parts follow
+    /// the light along walls' feet.
+    fn part(&mut self, element: u32, samples: [DVec3; 4]) -> bool {
+        let e = &self.facet.elements[element as usize];
+        if !e.is_leaf() {
             return true;
         }
-        if self.facet.split(element, self.pass.appearance) {
+        let size = e.max - e.min;
+        let [a, b, c, d] = e.corner_values(samples).map(luminance);
+        let change = DVec2::new((b + c - a - d).abs(), (c + d - a - b).abs());
+        let least = self.pass.indirect_threshold;
+        let clearly = |axis: usize| e.cut.is_none() && change[axis] > CLEARLY * change[1 - axis];
+        let along = [0, 1].map(|axis| {
+            let is_large = size[axis] > least && size[axis] * MOST_SLENDER > size[1 - axis];
+            is_large && (clearly(axis) || (!clearly(1 - axis) && size[axis] > 0.7 * size[1 - axis]))
+        });
+        if along == [false, false] {
+            return false;
+        }
+        let split = self.facet.split_into(element, along.map(|a| 1 + u32::from(a)), self.pass.appearance);
+        if split {
             self.counts.splits += 1;
             return true;
         }
@@ -212,11 +235,11 @@ impl Gathering<'_> {
     fn at(&mut self, point: SurfacePoint, element: u32) -> Gathered {
         let position = self.facet.frame.project(point.position);
         let (direct, _) = self.facet.received(element, position);
-        let light = luminance(direct).max(LEAST_REFERENCE * self.pass.typical);
+        let light = luminance(direct).max(par(5) * self.pass.typical);
         let mut rays = Rays::default();
         for block in self.directions.chunks_exact(STRATA * STRATA) {
             self.cast(point.position, block, &mut rays);
-            if rays.standard_error() <= self.round.noise * light.max(luminance(rays.irradiance())) {
+            if rays.standard_error() <= self.noise() * light.max(luminance(rays.irradiance())) {
                 break;
             }
         }
@@ -263,7 +286,9 @@ impl Rays {
     }
 
     fn standard_error(&self) -> f64 {
-        self.variance.sqrt() / self.count
+        // Points that fill ever finer strata do better than blocks that were independent.
+        let gain = (self.count / (STRATA * STRATA) as f64).powf(0.25);
+        self.variance.sqrt() / (self.count * gain)
     }
 }
 
@@ -332,4 +357,13 @@ mod tests {
         assert!((variance_within(&board) - 2.0 * (STRATA * STRATA) as f64).abs() < 1e-9);
         assert!(variance_within(&[3.0; STRATA * STRATA]) == 0.0);
     }
+}
+
+fn par(i: usize) -> f64 {
+    static P: std::sync::OnceLock<Vec<f64>> = std::sync::OnceLock::new();
+    P.get_or_init(|| std::env::var("PARS").unwrap_or("0.02,0.05,0.005,0.01,0.15,0.25,2.0".into()).split(',').map(|x| x.parse().unwrap()).collect())[i]
+}
+impl Gathering<'_> {
+    fn noise(&self) -> f64 { if self.round == Round::FIRST { par(0) } else { par(2) } }
+    fn tol(&self) -> f64 { if self.round == Round::FIRST { par(1) } else { par(3) } }
 }

@@ -124,12 +124,15 @@ pub fn solve(
     tracing::debug!(shots = patches.shots, rays = patches.rays(), patches = patches.patches.len(), "patches");
     pass.typical = patches.mean_irradiance();
     patches.spread_indirect(&mut facets, tracer.diagonal() * 1e-6);
+    let direct_scale = patches.direct_scale(&after);
     let elements = patches.elements_by_facet(facets.len());
     let mut gathering = GatherCounts::default();
     for (i, round) in [Round::FIRST, Round::LAST].into_iter().enumerate() {
-        let field = RadiosityField::new(&locator, &facets);
+        let field = RadiosityField::new(&locator, &facets, direct_scale);
         gathering.add(&gather(&pass, &field, &elements, round, &mut facets));
-        tracing::debug!(?gathering, "gathered");
+        let (mut a, mut b) = (DVec3::ZERO, DVec3::ZERO);
+        for p in &patches.patches { a += p.indirect * p.area; b += facets[p.facet as usize].mean(p.element).1 * p.area; }
+        tracing::debug!(?gathering, "gathered {}", b / a);
         if !progress(0.85 + 0.15 * i as f64) {
             return None;
         }

@@ -131,6 +131,17 @@ impl Patches {
         }
     }
 
+    /// What the energy balance made of the direct light in all, against what the mesh `received`.
+    #[must_use]
+    pub fn direct_scale(&self, received: &[DVec3]) -> DVec3 {
+        let (mut balanced, mut plain) = (DVec3::ZERO, DVec3::ZERO);
+        for (patch, &received) in self.patches.iter().zip(received) {
+            balanced += patch.direct * patch.area;
+            plain += received * patch.area;
+        }
+        DVec3::select(plain.cmpgt(DVec3::ZERO), balanced / plain, DVec3::ONE)
+    }
+
     /// Area-weighted mean luminance of what arrives, direct and indirect.
     #[must_use]
     pub fn mean_irradiance(&self) -> f64 {

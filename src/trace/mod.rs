@@ -2,7 +2,8 @@
 //!
 //! Positions are shifted to the scene's centre in double precision before they are
 //! rounded to `f32`, so that a scene a million metres from the origin is traced as
-//! well as one at the origin.
+//! well as one at the origin; and scaled, since obvhs 0.4 overlooks what is nearer to a
+//! ray's origin than 1e-4 of its units: walls' feet, sheets on desks.
 
 use std::time::Duration;
 
@@ -22,6 +23,10 @@ use crate::geom::Bounds;
 ///
 /// `f32` keeps positions to 6e-8 of the scene; two orders above that no ray meets the surface it left.
 pub const RAY_MARGIN: f64 = 4e-6;
+
+/// The scene's diagonal in obvhs's units. The nearest that is seen lies at 1e-4 of one, a thousandth of
+/// [`RAY_MARGIN`].
+const TRACED_DIAGONAL: f64 = 3e4;
 
 /// A closest hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +49,8 @@ pub struct Tracer {
     /// Empty where no triangle is double-sided.
     double_sided: Vec<bool>,
     centre: DVec3,
+    /// From metres to obvhs's units.
+    scale: f64,
     diagonal: f64,
 }
 
@@ -71,7 +78,9 @@ impl Tracer {
     pub fn new(triangles: Vec<[DVec3; 3]>) -> Self {
         let bounds = Bounds::of(triangles.iter().flatten().copied());
         let centre = if triangles.is_empty() { DVec3::ZERO } else { bounds.centre() };
-        let local = |p: DVec3| (p - centre).as_vec3a();
+        let diagonal = bounds.diagonal();
+        let scale = if diagonal > 0.0 { TRACED_DIAGONAL / diagonal } else { 1.0 };
+        let local = |p: DVec3| ((p - centre) * scale).as_vec3a();
         let boxed: Vec<Boxed> = triangles
             .iter()
             .map(|t| Boxed(obvhs::aabb::Aabb::from_points(&[local(t[0]), local(t[1]), local(t[2])])))
@@ -91,7 +100,7 @@ impl Tracer {
             })
             .collect();
         let double_sided = Vec::new();
-        Self { rays, boxes, ordered, triangles, double_sided, centre, diagonal: bounds.diagonal() }
+        Self { rays, boxes, ordered, triangles, double_sided, centre, scale, diagonal }
     }
 
     /// Marks the triangles whose backs are surfaces like their fronts, in the order given to [`new`](Self::new).
@@ -136,7 +145,9 @@ impl Tracer {
         if self.ordered.is_empty() {
             return false;
         }
-        let ray = Ray::new((from - self.centre).as_vec3a(), direction_of(to - from), 0.0, 1.0);
+        let length = (to - from).length();
+        let end = (length * self.scale) as f32;
+        let ray = Ray::new(self.traced(from), direction_of((to - from) / length), 0.0, end);
         !self.rays.ray_traverse_miss(ray, |ray, id| self.ordered[id].intersect(ray))
     }
 
@@ -146,7 +157,8 @@ impl Tracer {
         if self.ordered.is_empty() {
             return None;
         }
-        let ray = Ray::new_inf((origin - self.centre).as_vec3a(), direction_of(direction));
+        let length = direction.length();
+        let ray = Ray::new_inf(self.traced(origin), direction_of(direction / length));
         let mut hit = RayHit::none();
         if !self.rays.ray_traverse(ray, &mut hit, |ray, id| self.ordered[id].intersect(ray)) {
             return None;
@@ -155,7 +167,7 @@ impl Tracer {
         let normal = triangle.edge1.cross(triangle.edge2);
         Some(Hit {
             triangle: self.rays.primitive_indices[hit.primitive_id as usize] as usize,
-            distance: f64::from(hit.t),
+            distance: f64::from(hit.t) / (self.scale * length),
             from_behind: normal.dot(ray.direction) > 0.0,
         })
     }
@@ -167,8 +179,8 @@ impl Tracer {
         let slack = self.diagonal * f64::from(f32::EPSILON);
         let query = bounds.grown(slack);
         let query = obvhs::aabb::Aabb::new(
-            (query.min - self.centre).as_vec3a(),
-            (query.max - self.centre).as_vec3a(),
+            self.traced(query.min),
+            self.traced(query.max),
         );
         self.boxes.aabb_traverse(query, |bvh, node| {
             let node = &bvh.nodes[node as usize];
@@ -177,6 +189,11 @@ impl Tracer {
             true
         });
         out[first..].sort_unstable();
+    }
+
+    /// A point in obvhs's units.
+    fn traced(&self, p: DVec3) -> Vec3A {
+        ((p - self.centre) * self.scale).as_vec3a()
     }
 
     /// Visits the triangles in every leaf box that `keep` does not refuse; `keep` is asked from the root down.
@@ -188,8 +205,8 @@ impl Tracer {
         while let Some(index) = stack.pop() {
             let node = &self.boxes.nodes[index];
             let aabb = node.aabb();
-            let bounds =
-                Bounds { min: aabb.min.as_dvec3() + self.centre, max: aabb.max.as_dvec3() + self.centre };
+            let world = |p: Vec3A| p.as_dvec3() / self.scale + self.centre;
+            let bounds = Bounds { min: world(aabb.min), max: world(aabb.max) };
             if !keep(bounds) {
                 continue;
             }
@@ -251,6 +268,20 @@ mod tests {
             assert!(tracer.occluded(at(0.3, 0.6, 1.0), at(0.3, 0.6, 0.0)));
             assert!(!tracer.occluded(at(0.3, 0.6, 0.0), at(0.3, 0.6, 0.49)));
             assert!(!tracer.occluded(at(1.3, 0.6, 0.0), at(1.3, 0.6, 1.0)));
+        }
+    }
+
+    /// A ray that starts at a tenth of a thousandth of the scene from a wall meets it.
+    #[test]
+    fn what_is_very_near_is_met() {
+        for size in [1e-3, 1.0, 1e3] {
+            let scaled = |z| square_at(z).map(|t| t.map(|p| p * size));
+            let tracer = Tracer::new([scaled(0.0), scaled(1.0)].concat());
+            let origin = DVec3::new(0.4, 0.7, 2e-5) * size;
+            let direction = DVec3::new(0.1, 0.2, -1.0).normalize();
+            let hit = tracer.closest_hit(origin, direction).unwrap();
+            assert!(hit.distance < 2.2e-5 * size, "{hit:?}");
+            assert!(tracer.occluded(origin, origin + direction * size));
         }
     }
 
