@@ -22,7 +22,7 @@ use crate::unwrap::{Atlas, UnwrapOptions, unwrap};
 mod account;
 
 /// About how many patches the scene's area is divided into; small surfaces come on top.
-const PATCHES: f64 = 1500.0;
+const PATCHES: f64 = 500.0;
 
 /// Share of a page that charts fill, about: what a texel's size is guessed with before the charts are packed.
 const UTILISATION: f64 = 0.6;
@@ -191,7 +191,7 @@ impl Scale {
             Resolution::Size(side) => (area / UTILISATION).sqrt() / f64::from(side),
             Resolution::TexelsPerMetre(density) => 1.0 / density,
         };
-        let patch_size = (area / PATCHES).sqrt();
+        let patch_size = (area / std::env::var("PATCHES").map_or(PATCHES, |x| x.parse().unwrap())).sqrt();
         let threshold = options.subdivision_threshold.unwrap_or(match options.direct {
             Direct::Mesh => texel,
             Direct::Texel => TEXELS_AN_ELEMENT * texel,

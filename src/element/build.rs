@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::facet::{Facet, Side};
 use super::sampling::plane_fit;
-use super::{Cut, Element, NONE};
+use super::{Cut, Element, NONE, Shading};
 use crate::cob::{Cob, CobLists};
 use crate::geom::hull::convex_hull;
 use crate::geom::polygon::{area, clip_rectangle, rectangle};
@@ -259,8 +259,8 @@ impl Facet {
             samples,
             reflectance,
             cob: Cob::UNINITIALIZED,
-            direct: [DVec3::ZERO; 4],
-            indirect: [DVec3::ZERO; 4],
+            direct: Shading::default(),
+            indirect: Shading::default(),
         });
         Some((self.elements.len() - 1) as u32)
     }

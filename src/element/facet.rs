@@ -129,8 +129,9 @@ impl Facet {
         let mut at = element;
         while at != NONE {
             let e = &self.elements[at as usize];
-            direct += e.interpolate(&e.direct, p);
-            indirect += e.interpolate(&e.indirect, p);
+            let t = e.place(p);
+            direct += e.direct.at(t);
+            indirect += e.indirect.at(t);
             at = e.parent;
         }
         (direct.max(DVec3::ZERO), indirect.max(DVec3::ZERO))
@@ -141,7 +142,9 @@ impl Facet {
     pub fn mean(&self, element: u32) -> (DVec3, DVec3) {
         let e = &self.elements[element as usize];
         if e.is_leaf() {
-            return self.received(element, e.centroid);
+            // The paraboloid's mean is two thirds of its height.
+            let (direct, indirect) = self.received(element, e.centroid);
+            return (direct - e.direct.bulge / 3.0, indirect - e.indirect.bulge / 3.0);
         }
         let (direct, indirect, area) =
             e.children().fold((DVec3::ZERO, DVec3::ZERO, 0.0), |(direct, indirect, area), c| {

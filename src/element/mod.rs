@@ -53,10 +53,37 @@ pub struct Element {
     pub reflectance: DVec3,
     /// The Close Objects Buffer.
     pub cob: Cob,
-    /// Direct irradiance that this element received itself, in the corners.
-    pub direct: [DVec3; 4],
-    /// Indirect irradiance that it received itself, in the corners.
-    pub indirect: [DVec3; 4],
+    /// Direct irradiance that this element received itself.
+    pub direct: Shading,
+    /// Indirect irradiance that it received itself.
+    pub indirect: Shading,
+}
+
+/// Light over an element's rectangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Shading {
+    /// In the corners, in the order of [`Element::samples`].
+    pub corners: [DVec3; 4],
+    /// How much more it is in the middle than the mean of the corners: the share that no bilinear
+    /// interpolation holds. Without it, light that falls off to all sides would lose energy.
+    pub bulge: DVec3,
+}
+
+impl Shading {
+    /// The light at `t`, which runs from 0 to 1 along both sides: bilinear, and a paraboloid that vanishes in the
+    /// corners.
+    #[must_use]
+    pub fn at(&self, t: DVec2) -> DVec3 {
+        let [a, b, c, d] = self.corners;
+        let s = 2.0 * t - 1.0;
+        a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y) + self.bulge * (1.0 - 0.5 * s.length_squared())
+    }
+
+    /// Adds another's light.
+    pub fn add(&mut self, other: &Self) {
+        self.corners.iter_mut().zip(other.corners).for_each(|(sum, c)| *sum += c);
+        self.bulge += other.bulge;
+    }
 }
 
 /// What the outline leaves of an element's rectangle.
@@ -113,10 +140,24 @@ impl Element {
         }
     }
 
-    /// Bilinear interpolation of corner values at `p`, which may lie a little outside.
+    /// Where `p`, which may lie a little outside, is in the rectangle: 0 to 1 along both sides.
     #[must_use]
-    pub fn interpolate(&self, corners: &[DVec3; 4], p: DVec2) -> DVec3 {
-        let t = (p - self.min) / (self.max - self.min);
-        corners[0].lerp(corners[1], t.x).lerp(corners[3].lerp(corners[2], t.x), t.y)
+    pub fn place(&self, p: DVec2) -> DVec2 {
+        (p - self.min) / (self.max - self.min)
+    }
+
+    /// Light from its values in the samples.
+    #[must_use]
+    pub fn flat(&self, samples: [DVec3; 4]) -> Shading {
+        Shading { corners: self.corner_values(samples), bulge: DVec3::ZERO }
+    }
+
+    /// Light from its values in the samples and in the centroid.
+    #[must_use]
+    pub fn shading(&self, samples: [DVec3; 4], middle: DVec3) -> Shading {
+        let flat = self.flat(samples);
+        // The centroid of a cut element is no middle to speak of.
+        let bulge = if self.cut.is_some() { DVec3::ZERO } else { middle - flat.at(self.place(self.centroid)) };
+        Shading { bulge, ..flat }
     }
 }

@@ -5,10 +5,14 @@ use rayon::prelude::*;
 
 use super::{MeshVertex, PlanarRegion, RadiosityMesh, SurfaceMesh, triangulate};
 use crate::element::{Facet, Side};
+use crate::light::luminance;
 use crate::surface::Surface;
 
 /// Points closer than this fraction of a surface's extent are one.
 const SNAP: f64 = 1e-7;
+
+/// A bulge above this fraction of the light gets a vertex.
+const NOTABLE: f64 = 2e-3;
 
 /// Triangulates the leaves of all front facets and gives each vertex the mean of what the leaves around it
 /// received there.
@@ -55,12 +59,25 @@ fn leaf_points(facets: &[&Facet]) -> Vec<DVec2> {
         for leaf in facet.leaves() {
             let e = &facet.elements[leaf as usize];
             match &e.cut {
-                None => points.extend(e.corners()),
+                None => {
+                    points.extend(e.corners());
+                    if has_bulge(facet, leaf) {
+                        points.push(0.5 * (e.min + e.max));
+                    }
+                }
                 Some(cut) => points.extend(cut.rings.iter().flatten()),
             }
         }
     }
     points
+}
+
+/// Whether light in the leaf's middle is notably not what its corners say.
+fn has_bulge(facet: &Facet, leaf: u32) -> bool {
+    let e = &facet.elements[leaf as usize];
+    let bulge = luminance((e.direct.bulge + e.indirect.bulge).abs());
+    let (direct, indirect) = facet.received(leaf, e.centroid);
+    bulge > NOTABLE * luminance(direct + indirect)
 }
 
 /// Other regions' points that lie on this region's rings, and all regions' corners.

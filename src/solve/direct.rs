@@ -112,6 +112,8 @@ struct Receiving<'a> {
     facet: &'a mut Facet,
     /// The shot's irradiance in each sample that was asked for.
     values: Vec<Option<DVec3>>,
+    /// The same in the middle of the element at hand, where a policy asked for it.
+    middle: Option<DVec3>,
     evaluation: Evaluation,
     counts: ShotCounts,
 }
@@ -124,6 +126,7 @@ impl<'a> Receiving<'a> {
             emitter,
             facet,
             values,
+            middle: None,
             evaluation: Evaluation::new(Precision::EMITTER),
             counts: ShotCounts::default(),
         }
@@ -146,6 +149,7 @@ impl<'a> Receiving<'a> {
             }
             return;
         }
+        self.middle = None;
         if self.should_split(element, &hull, &between, is_umbra)
             && self.facet.split(element, self.pass.appearance)
         {
@@ -154,10 +158,11 @@ impl<'a> Receiving<'a> {
         } else if !is_umbra {
             let values = self.facet.elements[element as usize].samples.map(|s| self.value(s, &between));
             let e = &mut self.facet.elements[element as usize];
-            let corners = e.corner_values(values);
-            for (sum, value) in e.direct.iter_mut().zip(corners) {
-                *sum += value;
-            }
+            let shading = match self.middle {
+                Some(middle) => e.shading(values, middle),
+                None => e.flat(values),
+            };
+            e.direct.add(&shading);
         }
     }
 
@@ -285,7 +290,8 @@ impl<'a> Receiving<'a> {
         let values = samples.map(|s| self.value(s, between));
         let middle = self.evaluate(self.facet.centre(element), between);
         let e = &self.facet.elements[element as usize];
-        let interpolated = e.interpolate(&e.corner_values(values), e.centroid);
+        let interpolated = e.flat(values).at(e.place(e.centroid));
+        self.middle = Some(middle);
         let spread = values.iter().map(|&v| luminance((v - middle).abs())).fold(0.0, f64::max);
         Arriving { middle, interpolated, spread }
     }

@@ -7,7 +7,7 @@ use super::locate::{Descent, FacetLocator};
 use crate::element::Facet;
 use crate::trace::{Hit, Tracer};
 
-/// Reflected radiosity `ρ E` as the elements have it, bilinear in each.
+/// Reflected radiosity `ρ E` as the elements have it, as smooth as there.
 pub struct RadiosityField<'a> {
     locator: &'a FacetLocator,
     facets: Vec<FacetField>,
@@ -16,14 +16,16 @@ pub struct RadiosityField<'a> {
 struct FacetField {
     descent: Descent,
     /// By element; only leaves are ever asked.
-    patches: Vec<BilinearPatch>,
+    patches: Vec<FieldPatch>,
 }
 
 #[derive(Clone, Copy, Default)]
-struct BilinearPatch {
+struct FieldPatch {
     min: DVec2,
     per_size: DVec2,
     corners: [Vec3; 4],
+    /// As of [`Shading`](crate::element::Shading).
+    bulge: Vec3,
 }
 
 impl<'a> RadiosityField<'a> {
@@ -47,18 +49,17 @@ impl<'a> RadiosityField<'a> {
 
 impl FacetField {
     fn new(facet: &Facet, direct_scale: DVec3) -> Self {
-        let mut patches = vec![BilinearPatch::default(); facet.elements.len()];
+        let mut patches = vec![FieldPatch::default(); facet.elements.len()];
         for leaf in facet.leaves() {
             let e = &facet.elements[leaf as usize];
-            let radiosity = |corner| {
-                let (direct, indirect) = facet.received(leaf, corner);
+            let radiosity = |p| {
+                let (direct, indirect) = facet.received(leaf, p);
                 (e.reflectance * (direct * direct_scale + indirect)).as_vec3()
             };
-            patches[leaf as usize] = BilinearPatch {
-                min: e.min,
-                per_size: 1.0 / (e.max - e.min),
-                corners: e.corners().map(radiosity),
-            };
+            let corners = e.corners().map(radiosity);
+            let bulge = radiosity(0.5 * (e.min + e.max)) - 0.25 * corners.iter().sum::<Vec3>();
+            patches[leaf as usize] =
+                FieldPatch { min: e.min, per_size: 1.0 / (e.max - e.min), corners, bulge };
         }
         Self { descent: Descent::new(facet), patches }
     }
@@ -68,6 +69,7 @@ impl FacetField {
         let patch = &self.patches[self.descent.find(p, |_| false) as usize];
         let t = ((p - patch.min) * patch.per_size).clamp(DVec2::ZERO, DVec2::ONE).as_vec2();
         let [a, b, c, d] = patch.corners;
-        a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y)
+        let s = 2.0 * t - 1.0;
+        a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y) + patch.bulge * (1.0 - 0.5 * s.length_squared())
     }
 }

@@ -14,22 +14,23 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::direct::DirectPass;
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
+use super::patches::Receiver;
 use super::sequence;
-use crate::element::{Facet, NONE};
+use crate::element::{Facet, NONE, Shading};
 use crate::light::luminance;
 use crate::options::Refine;
 
-/// Rays are cast in blocks of a square of strata, this many a side.
-const STRATA: usize = 16;
+/// A place casts no fewer rays than this.
+const LEAST_RAYS: usize = 64;
 
-/// A place casts no more blocks than this.
-const MOST_BLOCKS: u32 = 16;
+/// A place casts no more rays than this.
+const MOST_RAYS: usize = 4096;
 
 /// How far a round goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +49,7 @@ impl Round {
 }
 
 /// In the dark, errors are measured by this fraction of the scene's mean light.
-const LEAST_REFERENCE: f64 = 0.25;
+pub(super) const LEAST_REFERENCE: f64 = 0.5;
 
 /// Where surfaces are nearer than the element is large, this share of the difference between the samples and
 /// the middle counts as error: the interpolation of an edge can be right in the middle by chance.
@@ -80,31 +81,35 @@ impl GatherCounts {
     }
 }
 
-/// Gathers what `field` reflects on all facets, in place of the reflected light that they had. `patches` holds
-/// the elements to begin with: of each facet, those that together cover it.
+/// Gathers what `field` reflects on all facets, in place of the reflected light that they had. `receivers`
+/// holds the elements to begin with: of each facet, those that together cover it.
 pub fn gather(
     pass: &DirectPass,
     field: &RadiosityField,
-    patches: &[Vec<u32>],
+    receivers: &[Vec<Receiver>],
     round: Round,
     facets: &mut [Facet],
 ) -> GatherCounts {
     let directions = directions();
     let counts: Vec<GatherCounts> = facets
         .par_iter_mut()
-        .zip(patches)
-        .map(|(facet, patches)| {
-            facet.elements.iter_mut().for_each(|e| e.indirect = [DVec3::ZERO; 4]);
+        .zip(receivers)
+        .map(|(facet, receivers)| {
+            facet.elements.iter_mut().for_each(|e| e.indirect = Shading::default());
             let mut gathering = Gathering {
                 pass,
                 field,
                 round,
                 directions: &directions,
+                rays: LEAST_RAYS,
                 places: vec![None; facet.samples.len()],
                 facet,
                 counts: GatherCounts::default(),
             };
-            patches.iter().for_each(|&p| gathering.receive(p));
+            for receiver in receivers {
+                gathering.rays = rays_for(receiver.contrast, gathering.noise());
+                gathering.receive(receiver.element);
+            }
             gathering.counts
         })
         .collect();
@@ -118,7 +123,9 @@ struct Gathering<'a> {
     pass: &'a DirectPass<'a>,
     field: &'a RadiosityField<'a>,
     round: Round,
-    directions: &'a [Direction],
+    directions: &'a [DVec3],
+    /// How many of them a place takes.
+    rays: usize,
     facet: &'a mut Facet,
     /// What the samples have gathered.
     places: Vec<Option<Gathered>>,
@@ -139,18 +146,21 @@ impl Gathering<'_> {
         let size = e.size();
         let least = self.pass.indirect_threshold;
         if size <= least {
-            let gathered = self.at(self.facet.centre(element), element);
-            self.facet.elements[element as usize].indirect = [gathered.irradiance; 4];
+            let gathered = self.at(self.facet.centre(element));
+            self.facet.elements[element as usize].indirect =
+                Shading { corners: [gathered.irradiance; 4], bulge: DVec3::ZERO };
             return;
         }
         let samples = e.samples;
-        let places = samples.map(|sample| self.sample(sample, element));
+        let places = samples.map(|sample| self.sample(sample));
         let values = places.map(|p| p.irradiance);
+        let mut shading = self.facet.elements[element as usize].flat(values);
         if size > least && self.may_split(element) {
-            let middle = self.at(self.facet.centre(element), element);
+            let middle = self.at(self.facet.centre(element));
             let e = &self.facet.elements[element as usize];
-            let interpolated = e.interpolate(&e.corner_values(values), e.centroid);
+            let interpolated = shading.at(e.place(e.centroid));
             let mut error = luminance((interpolated - middle.irradiance).abs());
+            shading = e.shading(values, middle.irradiance);
             if middle.distance < par(6) * size {
                 let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
                 error = differences.map(|d| par(4) * d).fold(error, f64::max);
@@ -167,8 +177,7 @@ impl Gathering<'_> {
                 return;
             }
         }
-        let e = &mut self.facet.elements[element as usize];
-        e.indirect = e.corner_values(values);
+        self.facet.elements[element as usize].indirect = shading;
     }
 
     fn may_split(&self, element: u32) -> bool {
@@ -223,103 +232,47 @@ impl Gathering<'_> {
         }
     }
 
-    fn sample(&mut self, sample: u32, element: u32) -> Gathered {
+    fn sample(&mut self, sample: u32) -> Gathered {
         if let Some(known) = self.places[sample as usize] {
             return known;
         }
-        let gathered = self.at(self.facet.samples[sample as usize].point, element);
+        let gathered = self.at(self.facet.samples[sample as usize].point);
         self.places[sample as usize] = Some(gathered);
         gathered
     }
 
-    fn at(&mut self, point: SurfacePoint, element: u32) -> Gathered {
-        let position = self.facet.frame.project(point.position);
-        let (direct, _) = self.facet.received(element, position);
-        let light = luminance(direct).max(par(5) * self.pass.typical);
-        let mut rays = Rays::default();
-        for block in self.directions.chunks_exact(STRATA * STRATA) {
-            self.cast(point.position, block, &mut rays);
-            if rays.standard_error() <= self.noise() * light.max(luminance(rays.irradiance())) {
-                break;
+    fn at(&mut self, point: SurfacePoint) -> Gathered {
+        let tracer = self.pass.tracer;
+        let frame = &self.facet.frame;
+        let origin = point.position;
+        let (mut sum, mut nearness) = (DVec3::ZERO, 0.0);
+        for d in &self.directions[..self.rays] {
+            let towards = d.x * frame.u + d.y * frame.v + d.z * frame.normal;
+            if let Some(hit) = tracer.closest_hit(origin, towards) {
+                sum += self.field.radiosity(tracer, &hit, origin + towards * hit.distance).as_dvec3();
+                nearness += 1.0 / hit.distance.max(tracer.margin());
             }
         }
         self.counts.places += 1;
-        self.counts.rays += rays.count as u64;
-        Gathered { irradiance: rays.irradiance(), distance: rays.count / rays.nearness }
-    }
-
-    fn cast(&self, origin: DVec3, block: &[Direction], rays: &mut Rays) {
-        let tracer = self.pass.tracer;
-        let frame = &self.facet.frame;
-        let mut met = [0.0_f32; STRATA * STRATA];
-        let mut sum = Vec3::ZERO;
-        for direction in block {
-            let d = direction.local;
-            let towards = d.x * frame.u + d.y * frame.v + d.z * frame.normal;
-            if let Some(hit) = tracer.closest_hit(origin, towards) {
-                let radiosity = self.field.radiosity(tracer, &hit, origin + towards * hit.distance);
-                met[direction.stratum] = luminance(radiosity.as_dvec3()) as f32;
-                sum += radiosity;
-                rays.nearness += 1.0 / hit.distance.max(tracer.margin());
-            }
-        }
-        rays.sum += sum.as_dvec3();
-        rays.count += block.len() as f64;
-        rays.variance += variance_within(&met);
+        self.counts.rays += self.rays as u64;
+        let rays = self.rays as f64;
+        Gathered { irradiance: sum / rays, distance: rays / nearness }
     }
 }
 
-/// The rays of one place.
-#[derive(Default)]
-struct Rays {
-    sum: DVec3,
-    /// Sum of the reciprocals of the distances to what was met.
-    nearness: f64,
-    /// Sum over the strata of the variance inside them.
-    variance: f64,
-    count: f64,
+/// How many rays bring the error down to `noise` where single ones deviate by `contrast`: strata of the hemisphere
+/// make it fall with the power of 3/4.
+fn rays_for(contrast: f64, noise: f64) -> usize {
+    let rays = (contrast / noise).powf(4.0 / 3.0);
+    (rays as usize).clamp(LEAST_RAYS, MOST_RAYS).next_power_of_two()
 }
 
-impl Rays {
-    fn irradiance(&self) -> DVec3 {
-        self.sum / self.count
-    }
-
-    fn standard_error(&self) -> f64 {
-        // Points that fill ever finer strata do better than blocks that were independent.
-        let gain = (self.count / (STRATA * STRATA) as f64).powf(0.25);
-        self.variance.sqrt() / (self.count * gain)
-    }
-}
-
-/// The sum of the variances inside the strata, of which each has one value here: half the squared difference of
-/// neighbours is about the variance in one of them.
-fn variance_within(met: &[f32; STRATA * STRATA]) -> f64 {
-    let square = |a: usize, b: usize| f64::from((met[a] - met[b]) * (met[a] - met[b]));
-    let mut squares = 0.0;
-    for i in 0..STRATA {
-        for j in 0..STRATA - 1 {
-            squares += square(i * STRATA + j, i * STRATA + j + 1);
-            squares += square(j * STRATA + i, (j + 1) * STRATA + i);
-        }
-    }
-    let pairs = 2 * STRATA * (STRATA - 1);
-    squares * 0.5 * (STRATA * STRATA) as f64 / pairs as f64
-}
-
-/// A direction about the normal `z`, and the stratum of the square that it comes from.
-struct Direction {
-    local: DVec3,
-    stratum: usize,
-}
-
-/// Cosine-distributed directions, block after block.
-fn directions() -> Vec<Direction> {
-    (0..(STRATA * STRATA) as u32 * MOST_BLOCKS)
+/// Cosine-distributed directions about `z`.
+fn directions() -> Vec<DVec3> {
+    (0..MOST_RAYS as u32)
         .map(|index| {
             let [u, v, ..] = sequence::point(index, 0);
-            let cell = |x: f64| (x * STRATA as f64) as usize;
-            Direction { local: cosine_direction(u, v), stratum: cell(u) * STRATA + cell(v) }
+            cosine_direction(u, v)
         })
         .collect()
 }
@@ -344,19 +297,11 @@ mod tests {
     #[test]
     fn directions_are_cosine_distributed() {
         let all = directions();
-        let mean: DVec3 = all.iter().map(|d| d.local).sum::<DVec3>() / all.len() as f64;
+        let mean: DVec3 = all.iter().sum::<DVec3>() / all.len() as f64;
         assert!((mean - DVec3::new(0.0, 0.0, 2.0 / 3.0)).length() < 1e-3, "{mean}");
-        assert!(all.iter().all(|d| (d.local.length() - 1.0).abs() < 1e-12));
+        assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-12));
     }
 
-    /// A checkerboard has the variance of its colours, an even sky none.
-    #[test]
-    fn variance_is_told_from_neighbours() {
-        let board: [f32; STRATA * STRATA] =
-            std::array::from_fn(|i| if (i / STRATA + i % STRATA) % 2 == 0 { 0.0 } else { 2.0 });
-        assert!((variance_within(&board) - 2.0 * (STRATA * STRATA) as f64).abs() < 1e-9);
-        assert!(variance_within(&[3.0; STRATA * STRATA]) == 0.0);
-    }
 }
 
 fn par(i: usize) -> f64 {

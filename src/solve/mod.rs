@@ -125,11 +125,11 @@ pub fn solve(
     pass.typical = patches.mean_irradiance();
     patches.spread_indirect(&mut facets, tracer.diagonal() * 1e-6);
     let direct_scale = patches.direct_scale(&after);
-    let elements = patches.elements_by_facet(facets.len());
+    let receivers = patches.receivers(&facets, gather::LEAST_REFERENCE * pass.typical);
     let mut gathering = GatherCounts::default();
     for (i, round) in [Round::FIRST, Round::LAST].into_iter().enumerate() {
         let field = RadiosityField::new(&locator, &facets, direct_scale);
-        gathering.add(&gather(&pass, &field, &elements, round, &mut facets));
+        gathering.add(&gather(&pass, &field, &receivers, round, &mut facets));
         let (mut a, mut b) = (DVec3::ZERO, DVec3::ZERO);
         for p in &patches.patches { a += p.indirect * p.area; b += facets[p.facet as usize].mean(p.element).1 * p.area; }
         tracing::debug!(?gathering, "gathered {}", b / a);

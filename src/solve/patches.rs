@@ -8,10 +8,12 @@
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::exchange::Exchange;
 use super::locate::FacetLocator;
-use crate::element::{Element, Facet, Side};
+use crate::element::{Element, Facet, Shading, Side};
+use crate::light::luminance;
 use crate::trace::Tracer;
 
 /// What emitters sent is scaled by no more than this to close the energy balance.
@@ -85,12 +87,26 @@ impl Patches {
         self.exchange.rays
     }
 
-    /// The patches' elements, for each of as many facets.
+    /// For each facet its patches' elements, with the standard deviation of the luminance that a ray from there
+    /// meets as a fraction of the light there, but not less than `least`.
     #[must_use]
-    pub fn elements_by_facet(&self, facets: usize) -> Vec<Vec<u32>> {
-        let mut elements = vec![Vec::new(); facets];
-        self.patches.iter().for_each(|p| elements[p.facet as usize].push(p.element));
-        elements
+    pub fn receivers(&self, facets: &[Facet], least: f64) -> Vec<Vec<Receiver>> {
+        let squares: Vec<f64> = self.patches.par_iter().map(|p| mean_square(facets, p)).collect();
+        let mut receivers = vec![Vec::new(); facets.len()];
+        for (index, patch) in self.patches.iter().enumerate() {
+            let (mut mean, mut square) = (0.0, 0.0);
+            for (other, g) in self.exchange.received(index) {
+                let other_patch = &self.patches[other];
+                let share = g / patch.area;
+                mean += share * luminance(other_patch.reflectance * (other_patch.direct + other_patch.indirect));
+                square += share * squares[other];
+            }
+            let deviation = (square - mean * mean).max(0.0).sqrt();
+            let light = luminance(patch.direct + patch.indirect).max(least);
+            let contrast = if light > 0.0 { deviation / light } else { 0.0 };
+            receivers[patch.facet as usize].push(Receiver { element: patch.element, contrast });
+        }
+        receivers
     }
 
     /// Takes in what glowing surfaces sent straight to each patch, scaled so that as much arrives as was
@@ -146,7 +162,7 @@ impl Patches {
     #[must_use]
     pub fn mean_irradiance(&self) -> f64 {
         let (sum, area) = self.patches.iter().fold((0.0, 0.0), |(sum, area), p| {
-            (sum + p.area * crate::light::luminance(p.direct + p.indirect), area + p.area)
+            (sum + p.area * luminance(p.direct + p.indirect), area + p.area)
         });
         if area > 0.0 { sum / area } else { 0.0 }
     }
@@ -206,9 +222,35 @@ impl Patches {
             let facet = &mut facets[patch.facet as usize];
             let corners = facet.elements[patch.element as usize].corners();
             let means = corners.map(|c| sums.get(&key(facet, c)).map_or(patch.indirect, |(sum, w)| *sum / *w));
-            facet.elements[patch.element as usize].indirect = means;
+            facet.elements[patch.element as usize].indirect = Shading { corners: means, bulge: DVec3::ZERO };
         }
     }
+}
+
+/// A patch's element that gathers.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Index in its facet.
+    pub element: u32,
+    /// Standard deviation of the luminance that a ray meets, as a fraction of the light there.
+    pub contrast: f64,
+}
+
+/// The mean square of the luminance that a patch reflects.
+fn mean_square(facets: &[Facet], patch: &Patch) -> f64 {
+    let facet = &facets[patch.facet as usize];
+    let (mut sum, mut area) = (0.0, 0.0);
+    let mut stack = vec![patch.element];
+    while let Some(element) = stack.pop() {
+        let e = &facet.elements[element as usize];
+        if e.is_leaf() {
+            let (direct, indirect) = facet.received(element, e.centroid);
+            sum += e.area * luminance(e.reflectance * (direct + indirect)).powi(2);
+            area += e.area;
+        }
+        stack.extend(e.children());
+    }
+    if area > 0.0 { sum / area } else { 0.0 }
 }
 
 impl Patch {
