@@ -50,6 +50,12 @@ impl Bounds {
         if self.min.cmple(self.max).all() { (self.max - self.min).length() } else { 0.0 }
     }
 
+    /// How far `point` is from the box, metres; 0 inside.
+    #[must_use]
+    pub fn distance(self, point: DVec3) -> f64 {
+        point.clamp(self.min, self.max).distance(point)
+    }
+
     /// The middle.
     #[must_use]
     pub fn centre(self) -> DVec3 {

@@ -13,6 +13,7 @@ use glam::{DAffine2, DVec2, DVec3};
 use super::cover::{Cover, Covering, neighbours, take_after_neighbours};
 use super::coverage::TexelSite;
 use super::fit::{FitTexel, LightSample, fit};
+use super::penumbra::{SmoothBlock, is_soft};
 use crate::geom::Frame;
 use crate::geom::polygon::{contains, rectangle};
 use crate::light::luminance;
@@ -25,6 +26,9 @@ use crate::unwrap::Chart;
 
 /// Blocks of no more texels than this are not halved further.
 const SMALL_BLOCK: usize = 8;
+
+/// Blocks of so many texels are looked at for smooth penumbrae.
+const SMOOTH_BLOCKS: std::ops::RangeInclusive<usize> = 33..=1024;
 
 /// Blocks of more texels than this are worked on side by side.
 const PARALLEL_BLOCK: usize = 4096;
@@ -199,6 +203,11 @@ impl Shining<'_> {
         if texels.len() <= SMALL_BLOCK {
             return self.shadow_edge(texels, &self.light.occluders.polygons(tracer, &between));
         }
+        if SMOOTH_BLOCKS.contains(&texels.len())
+            && let Some(done) = self.smooth_penumbra(texels, extent, &hull, &between)
+        {
+            return done;
+        }
         let (min, max) = extent;
         let axis = usize::from(max.y - min.y > max.x - min.x);
         let middle = 0.5 * (min[axis] + max[axis]);
@@ -238,6 +247,25 @@ impl Shining<'_> {
             texel.now = self.irradiance(texel.point, Between::Nothing, &mut evaluation);
         }
         evaluation.effort
+    }
+
+    /// A block that soft shadows fall on, if their light is smooth all over it.
+    fn smooth_penumbra(
+        &self,
+        texels: &mut [LitTexel],
+        extent: (DVec2, DVec2),
+        hull: &[DVec3; 4],
+        between: &[u32],
+    ) -> Option<Done> {
+        let occluders = self.light.occluders.polygons(self.light.tracer, between);
+        if !is_soft(hull, self.emitter, &occluders, self.light.tracer.diagonal()) {
+            return None;
+        }
+        let mut evaluation = Evaluation::new(Precision::EMITTER);
+        let light = |p| self.irradiance(p, Between::Polygons(&occluders), &mut evaluation);
+        let block = SmoothBlock::fit(extent, self.light.typical, light)?;
+        texels.iter_mut().for_each(|t| t.now = block.at(t.point));
+        Some(Done::of(evaluation.effort))
     }
 
     /// A small block in which shadow may fall: one point a texel where the light changes little from texel

@@ -11,6 +11,7 @@ mod dilate;
 mod direct;
 mod fit;
 mod locate;
+mod penumbra;
 
 use std::f64::consts::PI;
 

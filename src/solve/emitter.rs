@@ -354,6 +354,18 @@ impl Emitter {
         }
     }
 
+    /// How wide it is where it is narrowest, about, metres; `None` for punctual lights.
+    #[must_use]
+    pub fn width(&self) -> Option<f64> {
+        match self {
+            Self::Area(area) => {
+                let bounds = crate::geom::Bounds::of(area.hull.iter().copied());
+                Some(area.area / bounds.diagonal())
+            }
+            Self::Punctual(_) => None,
+        }
+    }
+
     /// Where a shadow ray from `at` to a punctual light ends.
     fn toward(&self, at: DVec3, diagonal: f64) -> DVec3 {
         match self {

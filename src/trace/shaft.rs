@@ -57,26 +57,33 @@ impl Shaft {
     /// Whether a triangle reaches into the shaft.
     #[must_use]
     pub fn touches(&self, triangle: &[DVec3; 3]) -> bool {
-        let mut is_inside = true;
-        for plane in &self.planes {
+        // Planes that cut the triangle, as bits; the first 64, which is more than shafts have.
+        let mut cutting = 0_u64;
+        for (index, plane) in self.planes.iter().enumerate() {
             let offset = plane.offset + self.margin;
             let above = triangle.map(|v| plane.normal.dot(v) > offset);
             if above == [false; 3] {
                 return false;
             }
-            is_inside &= above == [true; 3];
+            if above != [true; 3] && index < 64 {
+                cutting |= 1 << index;
+            }
         }
-        is_inside || self.clips_to_something(triangle)
+        cutting.count_ones() < 2 || self.clips_to_something(triangle, cutting)
     }
 
-    /// Cuts the triangle down to the shaft; something left means that it reaches in.
-    fn clips_to_something(&self, triangle: &[DVec3; 3]) -> bool {
-        let mut from = [DVec3::ZERO; MOST_CORNERS];
-        let mut to = from;
-        from[..3].copy_from_slice(triangle);
+    /// Cuts the triangle down by the `cutting` planes; something left means that it reaches in.
+    fn clips_to_something(&self, triangle: &[DVec3; 3], mut cutting: u64) -> bool {
+        let mut corners = [[DVec3::ZERO; MOST_CORNERS]; 2];
+        let mut current = 0;
+        corners[0][..3].copy_from_slice(triangle);
         let mut count = 3;
-        for plane in &self.planes {
+        while cutting != 0 {
+            let plane = &self.planes[cutting.trailing_zeros() as usize];
+            cutting &= cutting - 1;
             let offset = plane.offset + self.margin;
+            let [first, second] = &mut corners;
+            let (from, to) = if current == 0 { (first, second) } else { (second, first) };
             let mut kept = 0;
             let (mut a, mut height_a) = (from[count - 1], plane.normal.dot(from[count - 1]) - offset);
             for &b in &from[..count] {
@@ -97,7 +104,7 @@ impl Shaft {
             if kept == 0 {
                 return false;
             }
-            std::mem::swap(&mut from, &mut to);
+            current = 1 - current;
             count = kept;
         }
         true
