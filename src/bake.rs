@@ -33,6 +33,9 @@ const TEXELS_AN_ELEMENT: f64 = 4.0;
 /// Samples keep this fraction of the scene's diagonal from outlines.
 const NUDGE: f64 = 1e-5;
 
+/// They keep this many texels, too: light at a wall's foot that changes within less is none that a lightmap shows.
+const NUDGE_TEXELS: f64 = 0.1;
+
 /// What a bake gives.
 #[derive(Clone, Debug)]
 pub struct BakeResult {
@@ -95,8 +98,11 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     let surfaces = set.surfaces;
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
     let scale = Scale::of(&surfaces, options);
-    let mesh_options =
-        MeshOptions { patch_size: scale.patch_size, nudge: (NUDGE * tracer.diagonal()).max(std::env::var("NUDGE").map_or(0.1,|x|x.parse().unwrap()) * scale.indirect_threshold), lift: tracer.margin() };
+    let mesh_options = MeshOptions {
+        patch_size: scale.patch_size,
+        nudge: (NUDGE * tracer.diagonal()).max(NUDGE_TEXELS * scale.texel),
+        lift: tracer.margin(),
+    };
     let facets = build(&surfaces, &appearance, mesh_options);
     let initial = account::leaf_count(&facets);
 
@@ -182,6 +188,7 @@ struct Scale {
     patch_size: f64,
     threshold: f64,
     indirect_threshold: f64,
+    texel: f64,
 }
 
 impl Scale {
@@ -191,12 +198,12 @@ impl Scale {
             Resolution::Size(side) => (area / UTILISATION).sqrt() / f64::from(side),
             Resolution::TexelsPerMetre(density) => 1.0 / density,
         };
-        let patch_size = (area / std::env::var("PATCHES").map_or(PATCHES, |x| x.parse().unwrap())).sqrt();
+        let patch_size = (area / PATCHES).sqrt();
         let threshold = options.subdivision_threshold.unwrap_or(match options.direct {
             Direct::Mesh => texel,
             Direct::Texel => TEXELS_AN_ELEMENT * texel,
         });
         let indirect_threshold = options.subdivision_threshold.unwrap_or(texel);
-        Self { patch_size: patch_size.max(threshold), threshold, indirect_threshold }
+        Self { patch_size: patch_size.max(threshold), threshold, indirect_threshold, texel }
     }
 }

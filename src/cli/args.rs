@@ -112,6 +112,10 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "FRACTION", default_value_t = BakeOptions::default().unshot_fraction, allow_negative_numbers = true, help_heading = SOLVER)]
     unshot_fraction: f64,
 
+    /// The error that rays may leave in reflected light, as a fraction of the light; 0.0001 to 1
+    #[arg(long, value_name = "FRACTION", default_value_t = BakeOptions::default().gather_error, allow_negative_numbers = true, help_heading = SOLVER)]
+    gather_error: f64,
+
     /// Clamp reflectances to this; at least 0, below 1
     #[arg(long, value_name = "REFLECTANCE", default_value_t = BakeOptions::default().max_reflectance, allow_negative_numbers = true, help_heading = SOLVER)]
     max_reflectance: f64,
@@ -221,6 +225,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.shaft_test = on_unless(args.no_shaft_test);
         options.umbra_test = on_unless(args.no_umbra_test);
         options.unshot_fraction = args.unshot_fraction;
+        options.gather_error = args.gather_error;
         options.max_reflectance = args.max_reflectance;
         options.padding = args.padding;
         options.scene = args.scene;
@@ -257,7 +262,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --max-reflectance 0.9 --padding 2 --scene 1",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --scene 1",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -272,6 +277,7 @@ mod tests {
         meant.shaft_test = Toggle::Off;
         meant.umbra_test = Toggle::Off;
         meant.unshot_fraction = 0.01;
+        meant.gather_error = 0.02;
         meant.max_reflectance = 0.9;
         meant.padding = Some(2);
         meant.scene = Some(1);

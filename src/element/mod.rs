@@ -157,7 +157,8 @@ impl Element {
     pub fn shading(&self, samples: [DVec3; 4], middle: DVec3) -> Shading {
         let flat = self.flat(samples);
         // The centroid of a cut element is no middle to speak of.
-        let bulge = if self.cut.is_some() { DVec3::ZERO } else { middle - flat.at(self.place(self.centroid)) };
+        let bulge =
+            if self.cut.is_some() { DVec3::ZERO } else { middle - flat.at(self.place(self.centroid)) };
         Shading { bulge, ..flat }
     }
 }

@@ -99,6 +99,7 @@ fn provenance(baked: &Baked) -> Value {
         "subdivisionThreshold": baked.options.subdivision_threshold,
         "illuminationThreshold": baked.options.illumination_threshold,
         "unshotFraction": baked.options.unshot_fraction,
+        "gatherError": baked.options.gather_error,
         "maxReflectance": baked.options.max_reflectance,
         "texelsPerMetre": baked.atlas.texels_per_metre,
         "padding": baked.atlas.padding,

@@ -120,6 +120,9 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
 /// A gap with less light than this fraction of the brightest region of its surface is dark.
 const DARK: f64 = 1e-2;
 
+/// Less than this is none: the inside of a hollow pillar, say, whose foot must not darken the floor around it.
+const BLACK: f64 = 1e-4;
+
 /// For each surface's regions whether nobody sees them.
 fn buried_regions(input: &RasterInput) -> Vec<Vec<bool>> {
     let brightest = |mesh: &SurfaceMesh, region: usize| {
@@ -140,7 +143,7 @@ fn buried_regions(input: &RasterInput) -> Vec<Vec<bool>> {
             let light: Vec<f64> = (0..surface.regions.len()).map(|r| brightest(mesh, r)).collect();
             let most = light.iter().copied().fold(0.0, f64::max);
             let is_buried = |(region, &light): (&Region, &f64)| match outlook(surface, region, input.tracer) {
-                Outlook::Open => false,
+                Outlook::Open => light < BLACK * most,
                 Outlook::Narrow => light < DARK * most,
                 Outlook::Backs => true,
             };

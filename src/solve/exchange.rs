@@ -120,16 +120,14 @@ impl Target<'_> {
             let direction = facet.frame.cosine_direction(u, v);
             match self.tracer.closest_hit(origin, direction) {
                 None => escaping += 1,
-                Some(hit) => {
-                    match self.locator.find(self.tracer, &hit, origin + direction * hit.distance) {
-                        None => onto_backs += 1,
-                        Some((facet, p)) => {
-                            let of = &self.patch_of[facet];
-                            let element = self.descents[facet].find(p, |e| of[e as usize] != NONE);
-                            met.push(of[element as usize]);
-                        }
+                Some(hit) => match self.locator.find(self.tracer, &hit, origin + direction * hit.distance) {
+                    None => onto_backs += 1,
+                    Some((facet, p)) => {
+                        let of = &self.patch_of[facet];
+                        let element = self.descents[facet].find(p, |e| of[e as usize] != NONE);
+                        met.push(of[element as usize]);
                     }
-                }
+                },
             }
         }
         met.sort_unstable();

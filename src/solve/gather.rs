@@ -39,13 +39,20 @@ pub struct Round {
     pub noise: f64,
     /// The error in an element's middle that calls for a split, likewise.
     pub tolerance: f64,
+    /// Whether its light is what the lightmap holds.
+    pub is_last: bool,
 }
 
 impl Round {
-    /// Shows the next how light varies within patches.
-    pub const FIRST: Self = Self { noise: 0.02, tolerance: 0.05 };
-    /// What the lightmap holds.
-    pub const LAST: Self = Self { noise: 0.005, tolerance: 0.01 };
+    /// The first, which shows the second how light varies within patches, and the second, whose rays may leave
+    /// this `error`.
+    #[must_use]
+    pub fn both(error: f64) -> [Self; 2] {
+        [
+            Self { noise: 4.0 * error, tolerance: 12.0 * error, is_last: false },
+            Self { noise: error, tolerance: 5.0 * error, is_last: true },
+        ]
+    }
 }
 
 /// In the dark, errors are measured by this fraction of the scene's mean light.
@@ -53,7 +60,7 @@ pub(super) const LEAST_REFERENCE: f64 = 0.5;
 
 /// Where surfaces are nearer than the element is large, this share of the difference between the samples and
 /// the middle counts as error: the interpolation of an edge can be right in the middle by chance.
-#[allow(dead_code)] const NEAR_SHARE: f64 = 0.15;
+const NEAR_SHARE: f64 = 0.05;
 
 /// Light that changes this many times more along one axis than along the other changes along that one.
 const CLEARLY: f64 = 2.0;
@@ -107,7 +114,7 @@ pub fn gather(
                 counts: GatherCounts::default(),
             };
             for receiver in receivers {
-                gathering.rays = rays_for(receiver.contrast, gathering.noise());
+                gathering.rays = rays_for(receiver.contrast, round.noise);
                 gathering.receive(receiver.element);
             }
             gathering.counts
@@ -161,13 +168,13 @@ impl Gathering<'_> {
             let interpolated = shading.at(e.place(e.centroid));
             let mut error = luminance((interpolated - middle.irradiance).abs());
             shading = e.shading(values, middle.irradiance);
-            if middle.distance < par(6) * size {
+            if middle.distance < size {
                 let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
-                error = differences.map(|d| par(4) * d).fold(error, f64::max);
+                error = differences.map(|d| NEAR_SHARE * d).fold(error, f64::max);
             }
             let (direct, _) = self.facet.received(element, e.centroid);
-            let light = luminance(direct + middle.irradiance).max(par(5) * self.pass.typical);
-            if error > self.tol() * light && self.part(element, values) {
+            let light = luminance(direct + middle.irradiance).max(LEAST_REFERENCE * self.pass.typical);
+            if error > self.round.tolerance * light && self.part(element, values) {
                 self.hand_down(element, middle);
                 for child in self.facet.elements[element as usize].children {
                     if child != NONE {
@@ -183,9 +190,7 @@ impl Gathering<'_> {
     fn may_split(&self, element: u32) -> bool {
         match self.pass.options.refine {
             Refine::Gradient | Refine::CobGradient => true,
-            Refine::None | Refine::Uniform | Refine::Cob => {
-                !self.facet.elements[element as usize].is_leaf()
-            }
+            Refine::None | Refine::Uniform | Refine::Cob => !self.facet.elements[element as usize].is_leaf(),
         }
     }
 
@@ -264,7 +269,7 @@ impl Gathering<'_> {
 /// make it fall with the power of 3/4.
 fn rays_for(contrast: f64, noise: f64) -> usize {
     let rays = (contrast / noise).powf(4.0 / 3.0);
-    (rays as usize).clamp(LEAST_RAYS, MOST_RAYS).next_power_of_two()
+    (rays as usize).next_multiple_of(LEAST_RAYS).clamp(LEAST_RAYS, MOST_RAYS)
 }
 
 /// Cosine-distributed directions about `z`.
@@ -301,14 +306,4 @@ mod tests {
         assert!((mean - DVec3::new(0.0, 0.0, 2.0 / 3.0)).length() < 1e-3, "{mean}");
         assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-12));
     }
-
-}
-
-fn par(i: usize) -> f64 {
-    static P: std::sync::OnceLock<Vec<f64>> = std::sync::OnceLock::new();
-    P.get_or_init(|| std::env::var("PARS").unwrap_or("0.02,0.05,0.005,0.01,0.15,0.25,2.0".into()).split(',').map(|x| x.parse().unwrap()).collect())[i]
-}
-impl Gathering<'_> {
-    fn noise(&self) -> f64 { if self.round == Round::FIRST { par(0) } else { par(2) } }
-    fn tol(&self) -> f64 { if self.round == Round::FIRST { par(1) } else { par(3) } }
 }

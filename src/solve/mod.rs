@@ -123,20 +123,11 @@ pub fn solve(
     shoot_patches(&mut patches, problem, progress)?;
     tracing::debug!(shots = patches.shots, rays = patches.rays(), patches = patches.patches.len(), "patches");
     pass.typical = patches.mean_irradiance();
-    patches.spread_indirect(&mut facets, tracer.diagonal() * 1e-6);
-    let direct_scale = patches.direct_scale(&after);
-    let receivers = patches.receivers(&facets, gather::LEAST_REFERENCE * pass.typical);
-    let mut gathering = GatherCounts::default();
-    for (i, round) in [Round::FIRST, Round::LAST].into_iter().enumerate() {
-        let field = RadiosityField::new(&locator, &facets, direct_scale);
-        gathering.add(&gather(&pass, &field, &receivers, round, &mut facets));
-        let (mut a, mut b) = (DVec3::ZERO, DVec3::ZERO);
-        for p in &patches.patches { a += p.indirect * p.area; b += facets[p.facet as usize].mean(p.element).1 * p.area; }
-        tracing::debug!(?gathering, "gathered {}", b / a);
-        if !progress(0.85 + 0.15 * i as f64) {
-            return None;
-        }
-    }
+    let gathering = if patches.shots == 0 {
+        GatherCounts::default()
+    } else {
+        gather_reflected(&pass, &patches, &locator, &after, &mut facets, progress)?
+    };
     let emitters: Vec<Emitter> = glowing.into_iter().chain(lights).collect();
     Some(Solution {
         facets,
@@ -149,6 +140,31 @@ pub fn solve(
         direct,
         gathering,
     })
+}
+
+/// Lets all elements gather what the patches reflect in the end; `None` when told to stop. `received` is the
+/// direct light of the patches as the mesh has it.
+fn gather_reflected(
+    pass: &DirectPass,
+    patches: &Patches,
+    locator: &FacetLocator,
+    received: &[DVec3],
+    facets: &mut [Facet],
+    progress: &mut dyn FnMut(f64) -> bool,
+) -> Option<GatherCounts> {
+    patches.spread_indirect(facets, pass.tracer.diagonal() * 1e-6);
+    let direct_scale = patches.direct_scale(received);
+    let receivers = patches.receivers(facets, gather::LEAST_REFERENCE * pass.typical);
+    let mut counts = GatherCounts::default();
+    for round in Round::both(pass.options.gather_error) {
+        let field = RadiosityField::new(locator, facets, direct_scale);
+        counts.add(&gather(pass, &field, &receivers, round, facets));
+        tracing::debug!(?counts, "gathered");
+        if !progress(if round.is_last { 1.0 } else { 0.8 }) {
+            return None;
+        }
+    }
+    Some(counts)
 }
 
 /// Glowing regions and punctual lights, each the strongest first; ties keep the scene's order.

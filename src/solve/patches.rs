@@ -98,7 +98,8 @@ impl Patches {
             for (other, g) in self.exchange.received(index) {
                 let other_patch = &self.patches[other];
                 let share = g / patch.area;
-                mean += share * luminance(other_patch.reflectance * (other_patch.direct + other_patch.indirect));
+                mean +=
+                    share * luminance(other_patch.reflectance * (other_patch.direct + other_patch.indirect));
                 square += share * squares[other];
             }
             let deviation = (square - mean * mean).max(0.0).sqrt();
@@ -221,7 +222,8 @@ impl Patches {
         for patch in &self.patches {
             let facet = &mut facets[patch.facet as usize];
             let corners = facet.elements[patch.element as usize].corners();
-            let means = corners.map(|c| sums.get(&key(facet, c)).map_or(patch.indirect, |(sum, w)| *sum / *w));
+            let means =
+                corners.map(|c| sums.get(&key(facet, c)).map_or(patch.indirect, |(sum, w)| *sum / *w));
             facet.elements[patch.element as usize].indirect = Shading { corners: means, bulge: DVec3::ZERO };
         }
     }

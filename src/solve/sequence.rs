@@ -89,10 +89,8 @@ mod tests {
     /// The mean of a product over 4,096 points is far nearer than random points would bring it.
     #[test]
     fn products_are_integrated_well() {
-        let mean = (0..4096)
-            .map(|i| point(i, 3).iter().map(|x| 2.0 * x).product::<f64>())
-            .sum::<f64>()
-            / 4096.0;
+        let mean =
+            (0..4096).map(|i| point(i, 3).iter().map(|x| 2.0 * x).product::<f64>()).sum::<f64>() / 4096.0;
         assert!((mean - 1.0).abs() < 2e-3, "{mean}");
     }
 }

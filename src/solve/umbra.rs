@@ -17,6 +17,7 @@ use crate::trace::Tracer;
 pub struct Occluders {
     surface_of_triangle: Vec<u32>,
     outlines: Vec<Option<Vec<DVec3>>>,
+    areas: Vec<f64>,
 }
 
 /// Outlines with more corners occlude as triangles.
@@ -46,15 +47,17 @@ impl Occluders {
                 _ => None,
             });
         }
-        Self { surface_of_triangle, outlines }
+        let areas = surfaces.iter().map(|s| s.area).collect();
+        Self { surface_of_triangle, outlines, areas }
     }
 
-    /// The triangles `between` as convex polygons: a convex surface stands for all of its triangles.
+    /// The triangles `between` as convex polygons, those of large surfaces first, which may hide all that others
+    /// would be tried on. A convex surface stands for all of its triangles.
     ///
     /// `between` ascends, so a surface's triangles come one after the other, or nearly.
     #[must_use]
     pub fn polygons<'a>(&'a self, tracer: &'a Tracer, between: &[u32]) -> Vec<&'a [DVec3]> {
-        let mut polygons: Vec<&[DVec3]> = Vec::with_capacity(between.len());
+        let mut polygons: Vec<(f64, &[DVec3])> = Vec::with_capacity(between.len());
         let mut taken: Vec<u32> = Vec::new();
         for &t in between {
             let surface = self.surface_of_triangle[t as usize];
@@ -62,13 +65,17 @@ impl Occluders {
                 Some(outline) if outline.len() <= MOST_OUTLINE_CORNERS => {
                     if !taken.contains(&surface) {
                         taken.push(surface);
-                        polygons.push(outline);
+                        polygons.push((self.areas[surface as usize], outline));
                     }
                 }
-                _ => polygons.push(&tracer.triangles()[t as usize]),
+                _ => {
+                    let area = self.areas.get(surface as usize).copied().unwrap_or_default();
+                    polygons.push((area, &tracer.triangles()[t as usize]));
+                }
             }
         }
-        polygons
+        polygons.sort_by(|a, b| b.0.total_cmp(&a.0));
+        polygons.into_iter().map(|(_, polygon)| polygon).collect()
     }
 
     /// Whether some one of the triangles `between`, or the convex surface it belongs to, hides all of

@@ -178,10 +178,7 @@ impl Tracer {
         // Rounding to f32 must not lose a box that touches.
         let slack = self.diagonal * f64::from(f32::EPSILON);
         let query = bounds.grown(slack);
-        let query = obvhs::aabb::Aabb::new(
-            self.traced(query.min),
-            self.traced(query.max),
-        );
+        let query = obvhs::aabb::Aabb::new(self.traced(query.min), self.traced(query.max));
         self.boxes.aabb_traverse(query, |bvh, node| {
             let node = &bvh.nodes[node as usize];
             let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
