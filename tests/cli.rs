@@ -31,6 +31,7 @@ const OPTIONS: [&str; 21] = [
     "--no-shaft-test",
     "--no-umbra-test",
     "--unshot-fraction",
+    "--gather-error",
     "--padding",
     "--scene",
     "--quiet",

@@ -182,8 +182,9 @@ fn joined(patches: &[Patch], counts: &[Counts]) -> Vec<Row> {
 /// Scales rows and columns alike until each row sums to what its patch does not lose (Sinkhorn's scaling, for a
 /// symmetric matrix).
 fn scale(rows: &mut [Row], patches: &[Patch]) {
-    let arriving: Vec<f64> =
-        rows.iter().zip(patches).map(|(r, p)| p.area * (1.0 - r.escaping - r.onto_backs)).collect();
+    // Where all is lost, rounding may leave a little less than nothing.
+    let arriving = |(row, patch): (&Row, &Patch)| patch.area * (1.0 - row.escaping - row.onto_backs).max(0.0);
+    let arriving: Vec<f64> = rows.iter().zip(patches).map(arriving).collect();
     let mut scales = vec![1.0; rows.len()];
     let sum = |row: &Row, scales: &[f64]| -> f64 {
         row.factors.iter().map(|&(to, g)| f64::from(g) * scales[to as usize]).sum()
@@ -205,4 +206,53 @@ fn scale(rows: &mut [Row], patches: &[Patch]) {
         row.remainder = if sum > 0.0 { arriving / sum } else { 0.0 };
         row.factors.iter_mut().for_each(|(to, g)| *g *= (scales[i] * scales[*to as usize]) as f32);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn patch(area: f64) -> Patch {
+        Patch {
+            facet: 0,
+            element: 0,
+            area,
+            reflectance: DVec3::ONE,
+            direct: DVec3::ZERO,
+            indirect: DVec3::ZERO,
+            unshot: DVec3::ZERO,
+        }
+    }
+
+    fn row(factors: &[(u32, f32)], escaping: f64, onto_backs: f64) -> Row {
+        Row { factors: factors.to_vec(), remainder: 1.0, escaping, onto_backs }
+    }
+
+    /// Scaled rows hand out what their patches do not lose, and as much one way as the other.
+    #[test]
+    fn scaling_balances_rows_and_keeps_them_symmetric() {
+        let patches = [patch(1.0), patch(2.0), patch(0.5)];
+        let mut rows = [
+            row(&[(1, 0.4), (2, 0.2)], 0.25, 0.0),
+            row(&[(0, 0.4), (2, 0.3)], 0.5, 0.1),
+            row(&[(0, 0.2), (1, 0.3)], 0.0, 0.0),
+        ];
+        scale(&mut rows, &patches);
+        for (row, patch) in rows.iter().zip(&patches) {
+            let sum: f64 = row.factors.iter().map(|&(_, g)| f64::from(g) * row.remainder).sum();
+            let kept = 1.0 - row.escaping - row.onto_backs;
+            assert!((sum - patch.area * kept).abs() < 1e-6, "{sum}");
+        }
+        assert!((rows[0].factors[0].1 - rows[1].factors[0].1).abs() < 1e-6);
+    }
+
+    /// 1 − 0.9 − 0.1 is a little less than nothing.
+    #[test]
+    fn a_patch_that_loses_all_sends_nothing() {
+        let patches = [patch(1.0), patch(1.0)];
+        let mut rows = [row(&[(1, 0.1)], 0.9, 0.1), row(&[(0, 0.1)], 0.0, 0.5)];
+        scale(&mut rows, &patches);
+        let sums = rows.each_ref().map(|r| f64::from(r.factors[0].1) * r.remainder);
+        assert!(sums.iter().all(|s| s.is_finite()) && sums[0] == 0.0, "{sums:?}");
+    }
 }

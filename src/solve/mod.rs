@@ -221,7 +221,7 @@ fn shoot_patches(
         if !progress(0.4 + 0.3 * done.clamp(0.0, 1.0)) {
             return None;
         }
-        if patches.shoot().is_none() {
+        if !patches.shoot() {
             return Some(());
         }
     }

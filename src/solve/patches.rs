@@ -34,7 +34,7 @@ pub struct Patch {
     pub direct: DVec3,
     /// Irradiance reflected at least once.
     pub indirect: DVec3,
-    unshot: DVec3,
+    pub(super) unshot: DVec3,
 }
 
 /// Power per channel: where the light went.
@@ -174,16 +174,25 @@ impl Patches {
         self.patches.iter().map(|p| p.unshot * p.area).sum()
     }
 
-    /// The patch with the most unshot power shoots all of it. Its power, or `None` where none is left.
-    pub fn shoot(&mut self) -> Option<DVec3> {
+    /// The patches with the most unshot power shoot all of it: the strongest, and as they are met those that have
+    /// at least half as much. Whether any had some.
+    ///
+    /// Looking for the very strongest before each shot costs more than its shot is worth.
+    pub fn shoot(&mut self) -> bool {
         let power = |p: &Patch| (p.unshot * p.area).element_sum();
-        let (shooter, _) = self
-            .patches
-            .iter()
-            .enumerate()
-            .map(|(i, p)| (i, power(p)))
-            .filter(|&(_, w)| w > 0.0)
-            .max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+        let most = self.patches.iter().map(power).fold(0.0, f64::max);
+        if most <= 0.0 {
+            return false;
+        }
+        for shooter in 0..self.patches.len() {
+            if power(&self.patches[shooter]) >= 0.5 * most {
+                self.shoot_all_of(shooter);
+            }
+        }
+        true
+    }
+
+    fn shoot_all_of(&mut self, shooter: usize) {
         let patch = &mut self.patches[shooter];
         let radiosity = std::mem::take(&mut patch.unshot);
         let shot = radiosity * patch.area;
@@ -200,7 +209,6 @@ impl Patches {
         self.energy.absorbed += absorbed + shot * onto_backs;
         self.energy.escaped += shot * escaping;
         self.shots += 1;
-        Some(shot)
     }
 
     /// Writes what patches received by reflection into their elements, continuous where it was constant: a
