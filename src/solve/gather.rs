@@ -68,6 +68,10 @@ const CLEARLY: f64 = 2.0;
 /// No element becomes this many times longer than wide by being split across.
 const MOST_SLENDER: f64 = 32.0;
 
+/// An element that is smaller than this fraction of the distance to what it sees is not asked about its middle:
+/// light curves by less than it may (Ward, Rubinstein and Clear 1988 bound it so).
+const FLAT: f64 = 0.25;
+
 /// What gathering took.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GatherCounts {
@@ -162,7 +166,8 @@ impl Gathering<'_> {
         let places = samples.map(|sample| self.sample(sample));
         let values = places.map(|p| p.irradiance);
         let mut shading = self.facet.elements[element as usize].flat(values);
-        if size > least && self.may_split(element) {
+        let nearest = places.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
+        if size > FLAT * nearest && self.may_split(element) {
             let middle = self.at(self.facet.centre(element));
             let e = &self.facet.elements[element as usize];
             let interpolated = shading.at(e.place(e.centroid));
