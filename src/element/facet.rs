@@ -155,6 +155,20 @@ impl Facet {
         (direct / area, indirect / area)
     }
 
+    /// The leaves that `element` is split into, or itself.
+    #[must_use]
+    pub fn leaves_of(&self, element: u32) -> Vec<u32> {
+        let (mut leaves, mut stack) = (Vec::new(), vec![element]);
+        while let Some(at) = stack.pop() {
+            let e = &self.elements[at as usize];
+            if e.is_leaf() {
+                leaves.push(at);
+            }
+            stack.extend(e.children());
+        }
+        leaves
+    }
+
     /// The leaves in tree order.
     pub fn leaves(&self) -> impl Iterator<Item = u32> + '_ {
         (0..self.elements.len() as u32).filter(|&e| self.elements[e as usize].is_leaf())

@@ -24,6 +24,8 @@ pub struct Precision {
 impl Precision {
     /// For emitters: few, strong, and seen in every shadow's edge.
     pub const EMITTER: Self = Self { exact_occluders: 32, rays_a_side: 8 };
+    /// For small places that reflect much.
+    pub const HOT_SPOT: Self = Self { exact_occluders: 0, rays_a_side: 2 };
     /// For emitters seen from several points of one texel.
     pub const TEXEL: Self = Self { exact_occluders: 32, rays_a_side: 4 };
 }
@@ -136,6 +138,17 @@ impl AreaEmitter {
             return 0.0;
         }
         self.parts.iter().map(|p| signed_point_to_polygon(receiver, p)).sum::<f64>().clamp(0.0, 1.0)
+    }
+
+    /// The irradiance that it gives to `receiver`, visibility counted by a few rays; zero where it would give no
+    /// more than `negligible` with nothing between.
+    #[must_use]
+    pub fn irradiance_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, negligible: f64) -> DVec3 {
+        let arriving = self.exitance * self.unoccluded(receiver);
+        if arriving.max_element() <= negligible {
+            return DVec3::ZERO;
+        }
+        arriving * self.fraction_by_rays(receiver, tracer, &mut Evaluation::new(Precision::HOT_SPOT))
     }
 
     fn visible(

@@ -3,11 +3,16 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::hot::HotSpots;
 use super::locate::{Descent, FacetLocator};
-use crate::element::Facet;
+use crate::element::{Element, Facet};
+use crate::light::luminance;
 use crate::trace::{Hit, Tracer};
 
-/// Reflected radiosity `ρ E` as the elements have it, as smooth as there.
+/// Reflected radiosity `ρ E` as the elements have it, as smooth as there, but in hot spots no more than a cap.
+///
+/// What these reflect beyond it would be met by a ray here and none there. They shine as
+/// [emitters](super::hot) instead.
 pub struct RadiosityField<'a> {
     locator: &'a FacetLocator,
     facets: Vec<FacetField>,
@@ -26,14 +31,31 @@ struct FieldPatch {
     corners: [Vec3; 4],
     /// As of [`Shading`](crate::element::Shading).
     bulge: Vec3,
+    /// What the cap took, mean.
+    excess: Vec3,
 }
 
 impl<'a> RadiosityField<'a> {
-    /// Takes down what `facets` received, their direct light times `direct_scale`.
+    /// Takes down what `facets` received, their direct light times `direct_scale`; what `hot` spots reflect beyond
+    /// their cap is set apart.
     #[must_use]
-    pub fn new(locator: &'a FacetLocator, facets: &[Facet], direct_scale: DVec3) -> Self {
-        let facets = facets.par_iter().map(|facet| FacetField::new(facet, direct_scale)).collect();
+    pub fn new(locator: &'a FacetLocator, facets: &[Facet], hot: &HotSpots, direct_scale: DVec3) -> Self {
+        let facets = facets
+            .par_iter()
+            .zip(hot.leaves(facets))
+            .map(|(facet, is_hot)| FacetField::new(facet, &is_hot, direct_scale, hot.cap))
+            .collect();
         Self { locator, facets }
+    }
+
+    /// Mean radiosity of an element that was set apart.
+    #[must_use]
+    pub fn mean_excess(&self, index: usize, facet: &Facet, element: u32) -> DVec3 {
+        let leaves = facet.leaves_of(element);
+        let area = |leaf: u32| facet.elements[leaf as usize].area;
+        let excess = |leaf: u32| self.facets[index].patches[leaf as usize].excess.as_dvec3();
+        let sum: DVec3 = leaves.iter().map(|&l| area(l) * excess(l)).sum();
+        (sum / leaves.iter().map(|&l| area(l)).sum::<f64>()).max(DVec3::ZERO)
     }
 
     /// The radiosity that a ray met at `point`; zero on the back of a single-sided surface.
@@ -48,18 +70,22 @@ impl<'a> RadiosityField<'a> {
 }
 
 impl FacetField {
-    fn new(facet: &Facet, direct_scale: DVec3) -> Self {
+    fn new(facet: &Facet, is_hot: &[bool], direct_scale: DVec3, cap: f64) -> Self {
         let mut patches = vec![FieldPatch::default(); facet.elements.len()];
         for leaf in facet.leaves() {
             let e = &facet.elements[leaf as usize];
             let radiosity = |p| {
                 let (direct, indirect) = facet.received(leaf, p);
-                (e.reflectance * (direct * direct_scale + indirect)).as_vec3()
+                e.reflectance * (direct * direct_scale + indirect)
             };
-            let corners = e.corners().map(radiosity);
-            let bulge = radiosity(0.5 * (e.min + e.max)) - 0.25 * corners.iter().sum::<Vec3>();
-            patches[leaf as usize] =
-                FieldPatch { min: e.min, per_size: 1.0 / (e.max - e.min), corners, bulge };
+            let (corners, middle) = (e.corners().map(radiosity), radiosity(0.5 * (e.min + e.max)));
+            let whole = FieldPatch::of(e, corners, middle);
+            patches[leaf as usize] = if is_hot[leaf as usize] {
+                let capped = FieldPatch::of(e, corners.map(|c| capped(c, cap)), capped(middle, cap));
+                FieldPatch { excess: whole.mean() - capped.mean(), ..capped }
+            } else {
+                whole
+            };
         }
         Self { descent: Descent::new(facet), patches }
     }
@@ -72,4 +98,22 @@ impl FacetField {
         let s = 2.0 * t - 1.0;
         a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y) + patch.bulge * (1.0 - 0.5 * s.length_squared())
     }
+}
+
+impl FieldPatch {
+    fn of(e: &Element, corners: [DVec3; 4], middle: DVec3) -> Self {
+        let bulge = (middle - 0.25 * corners.iter().sum::<DVec3>()).as_vec3();
+        let corners = corners.map(|c| c.as_vec3());
+        Self { min: e.min, per_size: 1.0 / (e.max - e.min), corners, bulge, excess: Vec3::ZERO }
+    }
+
+    fn mean(&self) -> Vec3 {
+        0.25 * self.corners.iter().sum::<Vec3>() + self.bulge * (2.0 / 3.0)
+    }
+}
+
+/// A colour with its luminance brought down to `cap`.
+fn capped(colour: DVec3, cap: f64) -> DVec3 {
+    let luminance = luminance(colour);
+    if luminance > cap { colour * (cap / luminance) } else { colour }
 }

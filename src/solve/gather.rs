@@ -18,6 +18,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::direct::DirectPass;
+use super::emitter::AreaEmitter;
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
 use super::patches::Receiver;
@@ -72,6 +73,9 @@ const MOST_SLENDER: f64 = 32.0;
 /// light curves by less than it may (Ward, Rubinstein and Clear 1988 bound it so).
 const FLAT: f64 = 0.25;
 
+/// A hot spot that gives less than this fraction of the light is left out.
+const HOT_NEGLIGIBLE: f64 = 2e-5;
+
 /// What gathering took.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GatherCounts {
@@ -92,11 +96,20 @@ impl GatherCounts {
     }
 }
 
-/// Gathers what `field` reflects on all facets, in place of the reflected light that they had. `receivers`
+/// What is gathered.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    /// What rays read.
+    pub field: &'a RadiosityField<'a>,
+    /// What is too bright and too small for them.
+    pub hot_spots: &'a [AreaEmitter],
+}
+
+/// Gathers what `source` reflects on all facets, in place of the reflected light that they had. `receivers`
 /// holds the elements to begin with: of each facet, those that together cover it.
 pub fn gather(
     pass: &DirectPass,
-    field: &RadiosityField,
+    source: Source,
     receivers: &[Vec<Receiver>],
     round: Round,
     facets: &mut [Facet],
@@ -109,7 +122,7 @@ pub fn gather(
             facet.elements.iter_mut().for_each(|e| e.indirect = Shading::default());
             let mut gathering = Gathering {
                 pass,
-                field,
+                source,
                 round,
                 directions: &directions,
                 rays: LEAST_RAYS,
@@ -132,7 +145,7 @@ pub fn gather(
 /// One facet gathering.
 struct Gathering<'a> {
     pass: &'a DirectPass<'a>,
-    field: &'a RadiosityField<'a>,
+    source: Source<'a>,
     round: Round,
     directions: &'a [DVec3],
     /// How many of them a place takes.
@@ -259,14 +272,17 @@ impl Gathering<'_> {
         for d in &self.directions[..self.rays] {
             let towards = d.x * frame.u + d.y * frame.v + d.z * frame.normal;
             if let Some(hit) = tracer.closest_hit(origin, towards) {
-                sum += self.field.radiosity(tracer, &hit, origin + towards * hit.distance).as_dvec3();
+                sum += self.source.field.radiosity(tracer, &hit, origin + towards * hit.distance).as_dvec3();
                 nearness += 1.0 / hit.distance.max(tracer.margin());
             }
         }
         self.counts.places += 1;
         self.counts.rays += self.rays as u64;
         let rays = self.rays as f64;
-        Gathered { irradiance: sum / rays, distance: rays / nearness }
+        let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
+        let hot = self.source.hot_spots.iter().map(|s| s.irradiance_by_rays(point, tracer, negligible));
+        let hot: DVec3 = hot.sum();
+        Gathered { irradiance: sum / rays + hot, distance: rays / nearness }
     }
 }
 

@@ -12,6 +12,7 @@ pub mod exchange;
 pub mod field;
 pub mod form_factor;
 pub mod gather;
+pub mod hot;
 pub mod locate;
 pub mod patches;
 pub mod sequence;
@@ -29,7 +30,8 @@ use crate::trace::Tracer;
 use direct::{DirectPass, ShotCounts};
 use emitter::{AreaEmitter, Emitter};
 use field::RadiosityField;
-use gather::{GatherCounts, Round, gather};
+use gather::{GatherCounts, Round, Source, gather};
+use hot::HotSpots;
 use locate::FacetLocator;
 use patches::{Energy, Patches};
 use umbra::Occluders;
@@ -154,12 +156,15 @@ fn gather_reflected(
 ) -> Option<GatherCounts> {
     patches.spread_indirect(facets, pass.tracer.diagonal() * 1e-6);
     let direct_scale = patches.direct_scale(received);
-    let receivers = patches.receivers(facets, gather::LEAST_REFERENCE * pass.typical);
+    let hot = HotSpots::find(patches, facets);
+    let receivers = patches.receivers(facets, gather::LEAST_REFERENCE * pass.typical, &hot);
     let mut counts = GatherCounts::default();
     for round in Round::both(pass.options.gather_error) {
-        let field = RadiosityField::new(locator, facets, direct_scale);
-        counts.add(&gather(pass, &field, &receivers, round, facets));
-        tracing::debug!(?counts, "gathered");
+        let field = RadiosityField::new(locator, facets, &hot, direct_scale);
+        let hot_spots = hot.emitters(&field, facets);
+        let source = Source { field: &field, hot_spots: &hot_spots };
+        counts.add(&gather(pass, source, &receivers, round, facets));
+        tracing::debug!(?counts, hot_spots = hot_spots.len(), "gathered");
         if !progress(if round.is_last { 1.0 } else { 0.8 }) {
             return None;
         }

@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::exchange::Exchange;
+use super::hot::{HotSpots, reflected};
 use super::locate::FacetLocator;
 use crate::element::{Element, Facet, Shading, Side};
 use crate::light::luminance;
@@ -89,18 +90,19 @@ impl Patches {
 
     /// For each facet its patches' elements, with the standard deviation of the luminance that a ray from there
     /// meets as a fraction of the light there, but not less than `least`.
+    /// What `hot` spots reflect beyond their cap does not count.
     #[must_use]
-    pub fn receivers(&self, facets: &[Facet], least: f64) -> Vec<Vec<Receiver>> {
-        let squares: Vec<f64> = self.patches.par_iter().map(|p| mean_square(facets, p)).collect();
+    pub fn receivers(&self, facets: &[Facet], least: f64, hot: &HotSpots) -> Vec<Vec<Receiver>> {
+        let is_hot = hot.leaves(facets);
+        let moments: Vec<(f64, f64)> =
+            self.patches.par_iter().map(|p| reflected_moments(facets, p, &is_hot, hot.cap)).collect();
         let mut receivers = vec![Vec::new(); facets.len()];
         for (index, patch) in self.patches.iter().enumerate() {
             let (mut mean, mut square) = (0.0, 0.0);
             for (other, g) in self.exchange.received(index) {
-                let other_patch = &self.patches[other];
                 let share = g / patch.area;
-                mean +=
-                    share * luminance(other_patch.reflectance * (other_patch.direct + other_patch.indirect));
-                square += share * squares[other];
+                mean += share * moments[other].0;
+                square += share * moments[other].1;
             }
             let deviation = (square - mean * mean).max(0.0).sqrt();
             let light = luminance(patch.direct + patch.indirect).max(least);
@@ -108,6 +110,14 @@ impl Patches {
             receivers[patch.facet as usize].push(Receiver { element: patch.element, contrast });
         }
         receivers
+    }
+
+    /// Area-weighted mean luminance of what patches reflect.
+    #[must_use]
+    pub fn mean_reflected(&self) -> f64 {
+        let area: f64 = self.patches.iter().map(|p| p.area).sum();
+        let power = |p: &Patch| p.area * luminance(p.reflectance * (p.direct + p.indirect));
+        self.patches.iter().map(power).sum::<f64>() / area
     }
 
     /// Takes in what glowing surfaces sent straight to each patch, scaled so that as much arrives as was
@@ -246,21 +256,20 @@ pub struct Receiver {
     pub contrast: f64,
 }
 
-/// The mean square of the luminance that a patch reflects.
-fn mean_square(facets: &[Facet], patch: &Patch) -> f64 {
+/// Mean and mean square of the luminance that a patch reflects; hot leaves count as no more than `cap`.
+fn reflected_moments(facets: &[Facet], patch: &Patch, is_hot: &[Vec<bool>], cap: f64) -> (f64, f64) {
     let facet = &facets[patch.facet as usize];
-    let (mut sum, mut area) = (0.0, 0.0);
-    let mut stack = vec![patch.element];
-    while let Some(element) = stack.pop() {
-        let e = &facet.elements[element as usize];
-        if e.is_leaf() {
-            let (direct, indirect) = facet.received(element, e.centroid);
-            sum += e.area * luminance(e.reflectance * (direct + indirect)).powi(2);
-            area += e.area;
-        }
-        stack.extend(e.children());
+    let (mut sum, mut squares, mut area) = (0.0, 0.0, 0.0);
+    for leaf in facet.leaves_of(patch.element) {
+        let e = &facet.elements[leaf as usize];
+        let reflected = reflected(facet, leaf);
+        let reflected =
+            if is_hot[patch.facet as usize][leaf as usize] { reflected.min(cap) } else { reflected };
+        sum += e.area * reflected;
+        squares += e.area * reflected * reflected;
+        area += e.area;
     }
-    if area > 0.0 { sum / area } else { 0.0 }
+    if area > 0.0 { (sum / area, squares / area) } else { (0.0, 0.0) }
 }
 
 impl Patch {
