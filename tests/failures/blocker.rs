@@ -1,0 +1,102 @@
+//! A square blocker between a square emitter and a floor, at any height: its shadow in closed form.
+
+use cobake::options::{BakeOptions, CobHeight, Direct, Refine};
+
+use crate::model::{Baked, Model, both_sides, down, glow, paint, sized, up, v};
+use crate::rectangles::{Rectangle, Shaded};
+
+const EMITTED: f64 = 100.0;
+const HEIGHTS: [f64; 7] = [0.001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9];
+
+/// The emitter is 1 m above the floor; the blocker is off its axis, and off the texels' grid.
+fn shaded(height: f64) -> Shaded {
+    Shaded {
+        emitter: Rectangle::new((-0.25, -0.25), (0.25, 0.25)),
+        emitter_height: 1.0,
+        blocker: Rectangle::new((-0.217, -0.151), (0.183, 0.249)),
+        blocker_height: height,
+    }
+}
+
+fn bake(shaded: &Shaded, options: &BakeOptions) -> Baked {
+    let (e, b) = (shaded.emitter, shaded.blocker);
+    Model::new()
+        .add(&paint(0.5), &up((-1.5, -1.5), (1.5, 1.5), 0.0))
+        .add(&glow(EMITTED), &down(e.low, e.high, shaded.emitter_height))
+        .add(&both_sides(paint(0.0)), &up(b.low, b.high, shaded.blocker_height))
+        .bake(options)
+}
+
+/// How far a lightmap is from the closed form, as fractions of the brightest light.
+struct Miss {
+    /// Root mean square over the floor.
+    all: f64,
+    /// The largest where light is so smooth that texels could show it.
+    smooth: f64,
+    /// The most light in the umbra's middle.
+    umbra: f64,
+}
+
+fn miss(baked: &Baked, shaded: &Shaded) -> Miss {
+    let floor = baked.surface_at(v(-1.4, -1.4, 0.0), v(0.0, 0.0, 1.0)).expect("a floor");
+    let brightest = shaded_peak(shaded);
+    let texel = baked.texel();
+    let (mut sum, mut smooth, mut count) = (0.0, 0.0_f64, 0.0);
+    let steps = 80;
+    for k in 0..steps * steps {
+        let at = |i: i32| -1.4 + 2.8 * (f64::from(i) + 0.5) / f64::from(steps);
+        let (x, y) = (at(k % steps), at(k / steps));
+        let exact = |dx: f64, dy: f64| EMITTED * shaded.form_factor(x + dx * texel, y + dy * texel);
+        let error = (baked.on(floor, v(x, y, 0.0)) - exact(0.0, 0.0)).abs() / brightest;
+        let around = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(i, j)| exact(i, j));
+        let bend = (around.iter().sum::<f64>() / 4.0 - exact(0.0, 0.0)).abs() / brightest;
+        if bend < 0.003 {
+            smooth = smooth.max(error);
+        }
+        (sum, count) = (sum + error * error, count + 1.0);
+    }
+    let umbra = baked.on(floor, v(-0.017, 0.049, 0.0)) / brightest;
+    Miss { all: f64::sqrt(sum / count), smooth, umbra }
+}
+
+/// The floor's brightest place, were nothing in the way.
+fn shaded_peak(shaded: &Shaded) -> f64 {
+    EMITTED * crate::rectangles::parallel(shaded.emitter, shaded.emitter_height)
+}
+
+/// Where the umbra's middle is dark: the blocker covers the emitter from there.
+fn has_umbra(shaded: &Shaded) -> bool {
+    shaded.form_factor(-0.017, 0.049) == 0.0
+}
+
+/// Texels evaluate direct light anew, so neither the height nor the mesh matters.
+#[test]
+fn texels_hold_the_closed_form_at_any_height() {
+    for height in HEIGHTS {
+        let shaded = shaded(height);
+        for refine in [Refine::CobGradient, Refine::Cob, Refine::None] {
+            let mut options = sized(96);
+            options.refine = refine;
+            let m = miss(&bake(&shaded, &options), &shaded);
+            eprintln!("texel {height} {refine:?}: {} {} {}", m.all, m.smooth, m.umbra);
+        }
+    }
+}
+
+/// With light from the mesh alone, the buffer finds what stands within its prism.
+#[test]
+fn the_buffer_finds_the_shadow_within_its_height() {
+    for height in HEIGHTS {
+        let shaded = shaded(height);
+        for h in [0.1, 0.3, 1.0, 3.0, 10.0] {
+            for refine in [Refine::Cob, Refine::CobGradient] {
+            let mut options = sized(96);
+            (options.refine, options.direct) = (refine, Direct::Mesh);
+            options.cob_height = CobHeight::OfElement(h);
+            let baked = bake(&shaded, &options);
+            let m = miss(&baked, &shaded);
+            eprintln!("mesh {height} {h} {refine:?}: {} {} {} {}; {:?}", m.all, m.smooth, m.umbra, has_umbra(&shaded), baked.result.report.elements);
+            }
+        }
+    }
+}
