@@ -182,8 +182,9 @@ fn joined(patches: &[Patch], counts: &[Counts]) -> Vec<Row> {
 /// Scales rows and columns alike until each row sums to what its patch does not lose (Sinkhorn's scaling, for a
 /// symmetric matrix).
 fn scale(rows: &mut [Row], patches: &[Patch]) {
-    let arriving: Vec<f64> =
-        rows.iter().zip(patches).map(|(r, p)| p.area * (1.0 - r.escaping - r.onto_backs)).collect();
+    // Two shares that add up to one may leave a little less than nothing.
+    let kept = |r: &Row| (1.0 - r.escaping - r.onto_backs).max(0.0);
+    let arriving: Vec<f64> = rows.iter().zip(patches).map(|(r, p)| p.area * kept(r)).collect();
     let mut scales = vec![1.0; rows.len()];
     let sum = |row: &Row, scales: &[f64]| -> f64 {
         row.factors.iter().map(|&(to, g)| f64::from(g) * scales[to as usize]).sum()

@@ -162,7 +162,7 @@ impl Baked {
         let energy = &self.result.report.energy;
         let lost = energy.imbalance().abs().max_element();
         let emitted = energy.emitted.max_element();
-        assert!(lost <= LEDGER * emitted, "{lost} of {emitted} lost");
+        assert!(lost <= LEDGER * emitted, "{lost} of {emitted} lost: {energy:?}");
     }
 
     /// A texel's side, metres of the placed scene.
