@@ -14,8 +14,14 @@ fn lamp() -> Rectangle {
 /// Texels from the contact at which the light is looked at: the first within the texel that the line crosses.
 const AWAY: [f64; 5] = [0.05, 0.5, 1.0, 2.0, 4.0];
 
-/// Looks at `points` along `away` from a contact; the largest error as a fraction of `typical` light.
-fn errors(baked: &Baked, boxes: &Boxes, line: &[DVec3], away: DVec3, normal: DVec3, name: &str) {
+/// What may be missing and what may be too much, as fractions of typical light, beyond what holds within a texel.
+const BESIDE: (f64, f64) = (0.05, 0.01);
+
+/// Where a shadow's edge starts at a box's corner, the texel there cannot show it, and is 0.26 too dark.
+const AT_CONTACT: (f64, f64) = (0.3, 0.01);
+
+/// Looks along `line`, a contact, at several distances `away` from it.
+fn assert_light(baked: &Baked, boxes: &Boxes, line: &[DVec3], away: DVec3, normal: DVec3, name: &str) {
     let typical = EMITTED * boxes.form_factor(v(1.2, 1.2, 0.0), DVec3::Z);
     for distance in AWAY {
         let (mut low, mut high) = (0.0_f64, 0.0_f64);
@@ -25,7 +31,8 @@ fn errors(baked: &Baked, boxes: &Boxes, line: &[DVec3], away: DVec3, normal: DVe
             let found = baked.at(point, normal);
             (low, high) = (low.min((found - least) / typical), high.max((found - most) / typical));
         }
-        eprintln!("{name} {distance} texels: {low:.4} {high:.4}");
+        let (too_dark, too_bright) = if distance < 0.1 { AT_CONTACT } else { BESIDE };
+        assert!(low > -too_dark && high < too_bright, "{name}, {distance} texels away: {low} {high}");
     }
 }
 
@@ -62,12 +69,12 @@ fn a_box_on_a_floor() {
         .bake(&sized(160));
     let c = |x: f64, y: f64| v(x, y, 0.0);
     let (x0, x1, y0, y1) = (low.x, high.x, low.y, high.y);
-    errors(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), -DVec3::X, DVec3::Z, "floor lit x");
-    errors(&baked, &boxes, &along(c(x0, y0), c(x1, y0)), -DVec3::Y, DVec3::Z, "floor lit y");
-    errors(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::X, DVec3::Z, "floor shadow x");
-    errors(&baked, &boxes, &along(c(x0, y1), c(x1, y1)), DVec3::Y, DVec3::Z, "floor shadow y");
-    errors(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), DVec3::Z, -DVec3::X, "box foot lit");
-    errors(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::Z, DVec3::X, "box foot shadow");
+    assert_light(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), -DVec3::X, DVec3::Z, "floor lit x");
+    assert_light(&baked, &boxes, &along(c(x0, y0), c(x1, y0)), -DVec3::Y, DVec3::Z, "floor lit y");
+    assert_light(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::X, DVec3::Z, "floor shadow x");
+    assert_light(&baked, &boxes, &along(c(x0, y1), c(x1, y1)), DVec3::Y, DVec3::Z, "floor shadow y");
+    assert_light(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), DVec3::Z, -DVec3::X, "box foot lit");
+    assert_light(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::Z, DVec3::X, "box foot shadow");
 }
 
 /// A shelf cut into a wall: the wall above it is lit, the wall beneath lies in its shadow.
@@ -85,9 +92,9 @@ fn a_board_in_a_wall() {
         .bake(&sized(192));
     let above = along(v(low.x, 1.0, high.z), v(high.x, 1.0, high.z));
     let below = along(v(low.x, 1.0, low.z), v(high.x, 1.0, low.z));
-    errors(&baked, &boxes, &above, DVec3::Z, -DVec3::Y, "wall above");
-    errors(&baked, &boxes, &below, -DVec3::Z, -DVec3::Y, "wall below");
-    errors(&baked, &boxes, &above, -DVec3::Y, DVec3::Z, "board top");
+    assert_light(&baked, &boxes, &above, DVec3::Z, -DVec3::Y, "wall above");
+    assert_light(&baked, &boxes, &below, -DVec3::Z, -DVec3::Y, "wall below");
+    assert_light(&baked, &boxes, &above, -DVec3::Y, DVec3::Z, "board top");
 }
 
 /// A box pierces another's top: the light on both, beside the line where they cut.
@@ -105,9 +112,9 @@ fn boxes_that_pierce_each_other() {
         .bake(&sized(192));
     let c = |x: f64, y: f64| v(x, y, 0.5);
     let (x0, x1, y0, y1) = (upper.0.x, upper.1.x, upper.0.y, upper.1.y);
-    errors(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), -DVec3::X, DVec3::Z, "top lit");
-    errors(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::X, DVec3::Z, "top shadow");
-    errors(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), DVec3::Z, -DVec3::X, "side lit");
-    errors(&baked, &boxes, &along(c(x0, y0), c(x1, y0)), DVec3::Z, -DVec3::Y, "side askew");
-    errors(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::Z, DVec3::X, "side shadow");
+    assert_light(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), -DVec3::X, DVec3::Z, "top lit");
+    assert_light(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::X, DVec3::Z, "top shadow");
+    assert_light(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), DVec3::Z, -DVec3::X, "side lit");
+    assert_light(&baked, &boxes, &along(c(x0, y0), c(x1, y0)), DVec3::Z, -DVec3::Y, "side askew");
+    assert_light(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::Z, DVec3::X, "side shadow");
 }

@@ -44,7 +44,9 @@ fn nothing_gets_in() {
         let texel = sealed(0.05, 96).texel();
         let baked = sealed(texels * texel, 96);
         let outside = baked.at(v(0.5, 0.5, 1.0 + texels * texel), v(0.0, 0.0, 1.0));
-        eprintln!("sealed {texels}: {} outside {outside}", brightest_inside(&baked));
+        assert!(outside > LUX, "{outside} outside");
+        let inside = brightest_inside(&baked);
+        assert!(inside == 0.0, "{inside} inside of walls of {texels} texels");
     }
 }
 
@@ -56,5 +58,6 @@ fn nothing_gets_through_a_sheet() {
         .light("directional", LUX, v(0.0, 0.0, 3.0))
         .add(&sheet, &flipped(&cuboid(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0))))
         .bake(&sized(96));
-    eprintln!("sheet: {}", brightest_inside(&baked));
+    let inside = brightest_inside(&baked);
+    assert!(inside == 0.0, "{inside} inside of sheets");
 }

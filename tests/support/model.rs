@@ -4,7 +4,7 @@
 
 use cobake::options::{BakeOptions, Resolution};
 use cobake::progress::Silent;
-use cobake::scene::{ImportOptions, Scene, from_bytes};
+use cobake::scene::{ImportError, ImportOptions, Scene, from_bytes};
 use cobake::{BakeResult, bake_scene};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 use serde_json::{Value, json};
@@ -121,12 +121,17 @@ impl Model {
         self.draft.json.pointer(pointer).and_then(Value::as_array).map_or(0, Vec::len)
     }
 
-    pub(crate) fn scene(mut self) -> Scene {
+    pub(crate) fn scene(self) -> Scene {
+        self.read().expect("a scene")
+    }
+
+    /// The scene as an importer reads it.
+    pub(crate) fn read(mut self) -> Result<Scene, ImportError> {
         if self.count("/meshes/0/primitives") == 0 {
             self.draft.set("/meshes", json!([]));
             self.draft.json["nodes"][1].as_object_mut().expect("an object").remove("mesh");
         }
-        from_bytes(&self.draft.glb(), None, &ImportOptions::default()).expect("a scene")
+        from_bytes(&self.draft.glb(), None, &ImportOptions::default())
     }
 
     pub(crate) fn bake(self, options: &BakeOptions) -> Baked {
