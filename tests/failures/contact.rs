@@ -38,7 +38,12 @@ fn assert_light(baked: &Baked, boxes: &Boxes, line: &[DVec3], away: DVec3, norma
 
 /// The least and the most light within a texel of `point`, on its side of the contact: what a bilinear lookup
 /// there may show.
-fn around(baked: &Baked, boxes: &Boxes, (point, away, distance): (DVec3, DVec3, f64), normal: DVec3) -> (f64, f64) {
+fn around(
+    baked: &Baked,
+    boxes: &Boxes,
+    (point, away, distance): (DVec3, DVec3, f64),
+    normal: DVec3,
+) -> (f64, f64) {
     let across = normal.cross(away);
     let reach = baked.texel();
     let mut range = (f64::INFINITY, 0.0_f64);

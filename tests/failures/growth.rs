@@ -30,19 +30,16 @@ fn hall(side: u32) -> Baked {
 
 #[test]
 fn work_grows_with_the_scene() {
-    let counts: Vec<[f64; 4]> = [1, 3, 9]
-        .map(|side| {
-            let started = std::time::Instant::now();
-            let report = hall(side).result.report;
-            eprintln!("{side}: {:?} {:?} rays {} texels {:?} cob {} shots {}", started.elapsed(), report.scene, report.rays, report.texels, report.cob.bytes_total, report.shots);
-            let of = |count: u64| count as f64 / report.scene.triangles as f64;
-            [
-                of(report.elements.at_end),
-                of(report.rays),
-                of(report.texels.evaluated),
-                of(report.cob.bytes_total),
-            ]
-        })
-        .to_vec();
-    eprintln!("{counts:?}");
+    // Elements, rays, texels and the buffers' bytes against triangles: the slopes on logarithmic axes.
+    const SLOPES: [f64; 4] = [1.1, 1.35, 1.05, 1.15];
+    let [small, large] = [3, 9].map(|side| {
+        let report = hall(side).result.report;
+        let work = [report.elements.at_end, report.rays, report.texels.evaluated, report.cob.bytes_total];
+        (report.scene.triangles as f64, work.map(|count| count as f64))
+    });
+    let slopes: Vec<f64> =
+        (0..4).map(|i| (large.1[i] / small.1[i]).ln() / (large.0 / small.0).ln()).collect();
+    for (slope, most) in slopes.iter().zip(SLOPES) {
+        assert!(*slope < most, "elements, rays, texels, bytes grow with exponents {slopes:?}");
+    }
 }

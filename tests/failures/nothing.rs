@@ -78,10 +78,7 @@ fn white_walls_are_clamped() {
 fn what_escapes_is_counted() {
     let floor = Model::new().add(&paint(1.0), &up((0.0, 0.0), (2.0, 1.0), 0.0));
     let wall = quad(v(0.0, 1.0, 0.0), v(2.0, 1.0, 0.0), v(2.0, 1.0, 1.0), v(0.0, 1.0, 1.0));
-    let baked = floor
-        .add(&paint(1.0), &wall)
-        .light("directional", 10.0, v(0.0, 0.0, 5.0))
-        .bake(&sized(48));
+    let baked = floor.add(&paint(1.0), &wall).light("directional", 10.0, v(0.0, 0.0, 5.0)).bake(&sized(48));
     let energy = &baked.result.report.energy;
     // The sun falls on two square metres; what is not absorbed escapes.
     assert!((energy.emitted.x - 20.0).abs() < 0.02, "{energy:?}");

@@ -92,8 +92,7 @@ impl Model {
         let indices = self.draft.accessor("SCALAR", INT, &indices);
         let number = self.count("/materials");
         self.draft.set("/materials/-", material.clone());
-        let primitive =
-            json!({"attributes": {"POSITION": position}, "indices": indices, "material": number});
+        let primitive = json!({"attributes": {"POSITION": position}, "indices": indices, "material": number});
         self.draft.set("/meshes/0/primitives/-", primitive);
         self
     }

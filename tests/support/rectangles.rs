@@ -31,10 +31,7 @@ impl Rectangle {
     }
 
     fn moved(self, by: (f64, f64)) -> Self {
-        Self {
-            low: (self.low.0 + by.0, self.low.1 + by.1),
-            high: (self.high.0 + by.0, self.high.1 + by.1),
-        }
+        Self { low: (self.low.0 + by.0, self.low.1 + by.1), high: (self.high.0 + by.0, self.high.1 + by.1) }
     }
 
     fn scaled(self, by: f64) -> Self {
