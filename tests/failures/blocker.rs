@@ -60,23 +60,32 @@ fn shaded_peak(shaded: &Shaded) -> f64 {
     EMITTED * crate::rectangles::parallel(shaded.emitter, shaded.emitter_height)
 }
 
-/// Texels evaluate direct light anew, so neither the height nor the mesh matters.
+/// Texels evaluate direct light anew, so neither the height nor the mesh matters: what is missed is what texels
+/// 6 cm wide cannot show of an edge that is the sharper the lower the blocker lies.
 #[test]
 fn texels_hold_the_closed_form_at_any_height() {
-    for height in HEIGHTS {
+    const WITHIN: [f64; 7] = [0.055, 0.04, 0.01, 0.0025, 0.0012, 0.0006, 0.0004];
+    // Texels that fit an edge best overshoot beside it.
+    const BEYOND: f64 = 0.1;
+    for (height, within) in HEIGHTS.into_iter().zip(WITHIN) {
         let shaded = shaded(height);
         for refine in [Refine::Cob, Refine::None] {
             let mut options = sized(96);
             options.refine = refine;
-            let m = miss(&bake(&shaded, &options), &shaded);
-            eprintln!("texel {height} {refine:?}: {} {}", m.all, m.beyond);
+            let Miss { all, beyond } = miss(&bake(&shaded, &options), &shaded);
+            assert!(all < within, "{height} m, {refine:?}: {all} of the light is missed");
+            assert!(beyond < BEYOND, "{height} m, {refine:?}: {beyond} too much or too little");
         }
     }
 }
 
-/// With light from the mesh alone, the buffer finds what stands within its prism.
+/// With light from the mesh alone, the buffer finds what stands within its prism, and splits for nothing else.
 #[test]
 fn the_buffer_finds_the_shadow_within_its_height() {
+    // Of what a mesh without splits misses, this much may be left.
+    const LEFT: f64 = 0.9;
+    // The floor's first elements are a thirty-second of its side.
+    let element = 3.0 / 32.0 * std::f64::consts::SQRT_2;
     for height in [0.001, 0.01, 0.1, 0.3, 0.7] {
         let shaded = shaded(height);
         let with = |refine, h| {
@@ -90,7 +99,12 @@ fn the_buffer_finds_the_shadow_within_its_height() {
         let (blind, _) = with(Refine::None, 1.0);
         for h in [0.1, 1.0, 10.0] {
             let (found, splits) = with(Refine::Cob, h);
-            eprintln!("mesh {height} {h}: {} {splits}", found / blind);
+            if height < h * element {
+                assert!(splits > 0, "nothing found at {height} with {h}");
+                assert!(found < LEFT * blind, "{found} of {blind} left at {height} with {h}");
+            } else {
+                assert!(splits == 0, "{splits} useless splits at {height} with {h}");
+            }
         }
     }
 }
