@@ -146,7 +146,7 @@ fn keldysh_cube() {
 }
 
 /// 7. A square blocker halfway between a square emitter and a floor, both 1 m wide: the umbra is a point below,
-/// the penumbra three metres wide; below a blocker of 1.5 m the umbra is 2 m wide.
+///    the penumbra three metres wide; below a blocker of 1.5 m the umbra is 2 m wide.
 #[test]
 fn square_blocker_halfway() {
     // What texels 6 cm wide miss, and what rounding leaves in the umbra, of the brightest light.
