@@ -15,7 +15,7 @@ use super::coverage::TexelSite;
 use super::fit::{FitTexel, LightSample, fit};
 use super::penumbra::{SmoothBlock, is_soft};
 use crate::geom::Frame;
-use crate::geom::polygon::{contains, rectangle};
+use crate::geom::polygon::{Ring, contains, nearest_on_segment, rectangle};
 use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
@@ -42,6 +42,9 @@ const DIM: f64 = 0.02;
 
 /// Where a shadow's edge crosses a texel, light is evaluated at this many points a side of it.
 const POINTS_A_SIDE: u32 = 3;
+
+/// Samples keep this many texels from their region's outline.
+const OUTLINE: f64 = 0.02;
 
 /// A texel that receives direct light.
 #[derive(Clone, Copy, Debug)]
@@ -307,11 +310,21 @@ impl Shining<'_> {
             let place = DVec2::new((k % POINTS_A_SIDE).into(), (k / POINTS_A_SIDE).into());
             let at = corner + (place + 0.5) / f64::from(POINTS_A_SIDE);
             let point = self.plane_from_texel.transform_point2(at);
-            if contains(rings, point) && !self.cover.hides(point) {
+            if contains(rings, point) && !self.is_at_outline(rings, point) && !self.cover.hides(point) {
                 let light = self.irradiance(point, Between::Polygons(between), evaluation);
                 samples.push(LightSample { at, light });
             }
         }
+    }
+
+    /// Whether a point lies on its region's outline: where an emitter stands on that, it is seen edge-on from there.
+    fn is_at_outline(&self, rings: &[Ring], point: DVec2) -> bool {
+        let [right, down] = self.cover.step;
+        let least = OUTLINE * right.length().min(down.length());
+        rings.iter().any(|ring| {
+            let ends = ring.iter().zip(ring.iter().cycle().skip(1));
+            ends.into_iter().any(|(&a, &b)| nearest_on_segment(a, b, point).distance(point) < least)
+        })
     }
 
     fn irradiance(&self, point: DVec2, between: Between, evaluation: &mut Evaluation) -> DVec3 {
