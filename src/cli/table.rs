@@ -35,25 +35,26 @@ pub(crate) fn pair(a: &Path, b: &Path, figures: &PairFigures, scale: Option<f64>
     };
     let flip = &figures.flip;
     let rows = [
-        ["points", &figures.points.to_string(), "spread evenly over the surfaces of the second file's model"],
-        ["unmatched", &figures.unmatched.to_string(), "points without a lit surface in the first file"],
-        ["mean", &format!("{:.4} to {:.4}", figures.mean_a, figures.mean_b), quantity],
-        ["relL2", &(percent(figures.rel_l2) + " %"), "root of the summed squares, over the model's"],
-        ["bias", &(percent(figures.bias) + " %"), "of the mean"],
-        ["p50", &(percent(figures.p50) + " %"), "of the point's own light"],
-        ["p95", &(percent(figures.p95) + " %"), ""],
-        ["p99", &(percent(figures.p99) + " %"), ""],
+        ["points", &figures.points.to_string(), "spread evenly over A's surfaces"],
+        ["unmatched", &figures.unmatched.to_string(), "points that lie on no lit surface of B"],
+        ["mean of A", &format!("{:.4}", figures.mean_a), quantity],
+        ["mean of B", &format!("{:.4}", figures.mean_b), ""],
+        ["relL2 %", &percent(figures.rel_l2), "of A's root mean square"],
+        ["bias %", &percent(figures.bias), "of A's mean"],
+        ["p50 %", &percent(figures.p50), "of the point's own light in A"],
+        ["p95 %", &percent(figures.p95), ""],
+        ["p99 %", &percent(figures.p99), ""],
         ["FLIP mean", &format!("{:.4}", flip.mean), "0 looks alike, 1 does not"],
         ["FLIP p95", &format!("{:.4}", flip.p95), ""],
         ["FLIP max", &format!("{:.4}", flip.max), ""],
-        ["texels", &flip.texels.to_string(), "compared by FLIP"],
+        ["texels", &flip.texels.to_string(), "of A's page, compared by FLIP"],
     ]
     .map(|cells| cells.map(str::to_owned));
-    let mut text = format!("{} against its model {}\n", b.display(), a.display());
+    let mut text = format!("A  {}\nB  {}\n", a.display(), b.display());
     text += &aligned(&rows);
     if let Some(scale) = scale {
         text += &format!(
-            "heat map: black is 0, pale yellow {} % of the texel's own light or more\n",
+            "heat map: black is 0, pale yellow {} % of the texel's own light in A, or more\n",
             percent(scale)
         );
     }
