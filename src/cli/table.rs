@@ -36,7 +36,8 @@ pub(crate) fn pair(a: &Path, b: &Path, figures: &PairFigures, scale: Option<f64>
     let flip = &figures.flip;
     let rows = [
         ["points", &figures.points.to_string(), "spread evenly over A's surfaces"],
-        ["unmatched", &figures.unmatched.to_string(), "points that lie on no lit surface of B"],
+        ["unmatched", &figures.unmatched.to_string(), "points that lie on no lit surface of B, left out"],
+        ["hidden", &figures.hidden.to_string(), "points inside solids, left out too"],
         ["mean of A", &format!("{:.4}", figures.mean_a), quantity],
         ["mean of B", &format!("{:.4}", figures.mean_b), ""],
         ["relL2 %", &percent(figures.rel_l2), "of A's root mean square"],

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::CompareError;
 use super::bilinear::sample;
+use super::hidden::is_inside_a_solid;
 use super::triangle::{nearest, point};
 use crate::export::{COBAKE_LIGHTMAP, LIGHTMAP_SET, decode_exr};
 use crate::geom::Bounds;
@@ -76,11 +77,17 @@ impl BakedScene {
 
         let corner = |vertex: u32| scene.vertices.get(vertex as usize).copied().unwrap_or_default();
         let corners: Vec<_> = scene.triangles.iter().map(|t| t.vertices.map(corner)).collect();
+        let material = |placement: u32| {
+            scene.placements.get(placement as usize).and_then(|p| scene.materials.get(p.material))
+        };
+        let double_sided =
+            scene.triangles.iter().map(|t| material(t.placement).is_some_and(|m| m.double_sided));
+        let double_sided = double_sided.collect();
         let bounds = Bounds::of(scene.vertices.iter().copied());
         let baked = Self {
             path: path.to_owned(),
             normals: corners.iter().map(|&t| area_normal(t).normalize_or_zero()).collect(),
-            tracer: Tracer::new(corners),
+            tracer: Tracer::new(corners).with_double_sided(double_sided),
             tolerance: TOLERANCE * (bounds.max - bounds.min).max_element(),
             coordinates,
             pages,
@@ -155,6 +162,13 @@ impl BakedScene {
     pub fn point_at(&self, place: &Place) -> Option<(DVec3, DVec3)> {
         let corners = self.triangles().get(place.triangle)?;
         Some((point(*corners, place.barycentric), *self.normals.get(place.triangle)?))
+    }
+
+    /// Whether a place lies inside a solid, where nobody sees it: under a box on a floor, say. Told by the
+    /// backs of single-sided surfaces that are seen from there.
+    #[must_use]
+    pub fn is_hidden(&self, place: &Place) -> bool {
+        self.point_at(place).is_some_and(|(point, normal)| is_inside_a_solid(&self.tracer, point, normal))
     }
 
     /// What the lightmap says of a place, in its own quantity; `None` where there is no lightmap.

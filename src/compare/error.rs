@@ -50,8 +50,8 @@ pub enum CompareError {
         source: ExportError,
     },
 
-    /// The lightmap of a bake lights no triangle.
-    #[error("no surface of {} has lightmap coordinates; bake the scene again", path.display())]
+    /// The lightmap of a bake lights no triangle that is seen from its front.
+    #[error("no surface of {} that is seen from its front has a lightmap; check its faces' winding and bake it again", path.display())]
     Unlit {
         /// The file.
         path: PathBuf,

@@ -1,7 +1,7 @@
 //! A page of errors as a picture.
 //!
 //! Black is no error, pale yellow the scale's end or more, in the "magma" colour map of N. Smith and
-//! S. van der Walt (2015, CC0), in which equal steps look equal. Blue-grey texels hold no surface; green
+//! S. van der Walt (2015, CC0), in which equal steps look equal. Blue-grey texels hold no surface that is seen; green
 //! ones a surface that the other bake lacks.
 
 use super::CompareError;

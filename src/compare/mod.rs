@@ -17,6 +17,7 @@ mod error;
 mod figures;
 mod flip;
 mod heat_map;
+mod hidden;
 mod npy;
 mod npz;
 mod page;

@@ -1,6 +1,6 @@
 //! One bake's page, with another bake's light on it.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -21,8 +21,8 @@ const NONE: u32 = u32::MAX;
 /// What a person would see of the difference, over the first bake's page.
 ///
 /// Both bakes' light is put on the texels of the first one's first lightmap, tone-mapped alike, and
-/// compared by [`flip`] at the paper's viewing distance, a texel a pixel. Texels without a surface, and
-/// those whose surface the other bake lacks, are the same in both and are not counted.
+/// compared by [`flip`] at the paper's viewing distance, a texel a pixel. Texels without a surface or inside a
+/// solid, and those whose surface the other bake lacks, are the same in both and are not counted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PageFigures {
     /// Texels counted.
@@ -45,15 +45,15 @@ pub(super) struct PageLight {
     pub(super) texels: Vec<TexelLight>,
 }
 
-/// A texel in both bakes.
+/// A texel in both bakes. Pages are large, and half precision is what most of them hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum TexelLight {
-    /// No surface, or too small a part of one.
+    /// No surface, too small a part of one, or one inside a solid.
     Empty,
     /// The other bake does not have this surface.
-    Unmatched(DVec3),
+    Unmatched(Vec3),
     /// The first bake's light, and the other's.
-    Both(DVec3, DVec3),
+    Both(Vec3, Vec3),
 }
 
 impl PageLight {
@@ -69,11 +69,16 @@ impl PageLight {
                 return TexelLight::Empty;
             };
             let place = Place { triangle: triangle as usize, barycentric };
-            let Some(value) = light.at(first, &place) else { return TexelLight::Empty };
+            if first.is_hidden(&place) {
+                return TexelLight::Empty;
+            }
+            let Some(value) = light.at(first, &place).map(|value| value.as_vec3()) else {
+                return TexelLight::Empty;
+            };
             let found = first.point_at(&place).and_then(|(point, normal)| other.locate(point, normal));
             found
                 .and_then(|place| light.at(other, &place))
-                .map_or(TexelLight::Unmatched(value), |found| TexelLight::Both(value, found))
+                .map_or(TexelLight::Unmatched(value), |found| TexelLight::Both(value, found.as_vec3()))
         };
         let texels = triangles.par_iter().enumerate().map(look_up).collect();
         Some(Self { width, height, texels })
@@ -83,14 +88,14 @@ impl PageLight {
     pub(super) fn figures(&self) -> PageFigures {
         let values = self.texels.iter().filter_map(|texel| match *texel {
             TexelLight::Empty => None,
-            TexelLight::Unmatched(value) | TexelLight::Both(value, _) => Some(value),
+            TexelLight::Unmatched(value) | TexelLight::Both(value, _) => Some(value.as_dvec3()),
         });
         let tone = ToneMap::for_values(values);
         let picture = |of_other: bool| -> Vec<Colour> {
             let colour = |texel: &TexelLight| match *texel {
                 TexelLight::Empty => [0; 3],
-                TexelLight::Both(_, value) if of_other => tone.colour(value),
-                TexelLight::Unmatched(value) | TexelLight::Both(value, _) => tone.colour(value),
+                TexelLight::Both(_, value) if of_other => tone.colour(value.as_dvec3()),
+                TexelLight::Unmatched(value) | TexelLight::Both(value, _) => tone.colour(value.as_dvec3()),
             };
             self.texels.par_iter().map(colour).collect()
         };
@@ -113,7 +118,7 @@ impl PageLight {
     pub(super) fn errors(&self, darkest: f64) -> impl Iterator<Item = Option<f64>> {
         self.texels.iter().map(move |texel| match *texel {
             TexelLight::Both(first, other) => {
-                let (first, other) = (brightness(first), brightness(other));
+                let (first, other) = (brightness(first.as_dvec3()), brightness(other.as_dvec3()));
                 Some(ratio((other - first).abs(), first.max(darkest)))
             }
             TexelLight::Empty | TexelLight::Unmatched(_) => None,

@@ -43,6 +43,8 @@ pub struct PairFigures {
     pub points: usize,
     /// Points of A that lie on no lit surface of B. They count in no figure.
     pub unmatched: usize,
+    /// Points of A inside solids, under a box on a floor, say: nobody sees them. They count in no figure.
+    pub hidden: usize,
     /// Mean of A over points and channels, in the scene's units.
     pub mean_a: f64,
     /// Mean of B.
@@ -83,25 +85,26 @@ impl PairComparison {
 ///
 /// # Errors
 /// [`CompareError::NothingMatched`] where no point of `a` lies on `b`, [`CompareError::Unlit`] where `a`'s
-/// lit surfaces have no area.
+/// lit surfaces have no area that is seen.
 pub fn with_bake(a: &BakedScene, b: &BakedScene) -> Result<PairComparison, CompareError> {
     let light = if a.quantity() == b.quantity() { Light::Stored } else { Light::Irradiance };
-    let places = places(a, POINTS);
+    let all = places(a, POINTS);
+    let total = all.len();
+    let seen: Vec<Place> = all.into_par_iter().filter(|place| !a.is_hidden(place)).collect();
     let look_up = |place: &Place| {
         let (point, normal) = a.point_at(place)?;
         let found = b.locate(point, normal)?;
         Some((light.at(a, place)?, light.at(b, &found)?))
     };
-    let found: Vec<Option<(DVec3, DVec3)>> = places.par_iter().map(look_up).collect();
+    let found: Vec<Option<(DVec3, DVec3)>> = seen.par_iter().map(look_up).collect();
     let pairs: Vec<(DVec3, DVec3)> = found.into_iter().flatten().collect();
-    let unlit = || CompareError::Unlit { path: a.path().to_owned() };
-    if places.is_empty() {
-        return Err(unlit());
+    if seen.is_empty() {
+        return Err(CompareError::Unlit { path: a.path().to_owned() });
     }
     if pairs.is_empty() {
-        return Err(CompareError::NothingMatched { path: b.path().to_owned(), points: places.len() });
+        return Err(CompareError::NothingMatched { path: b.path().to_owned(), points: seen.len() });
     }
-    let page = PageLight::of(a, b, light).ok_or_else(unlit)?;
+    let page = PageLight::of(a, b, light).ok_or_else(|| CompareError::Unlit { path: a.path().to_owned() })?;
     let count = pairs.len() as f64;
     let sum = |term: &dyn Fn(DVec3, DVec3) -> f64| pairs.iter().map(|&(a, b)| term(a, b)).sum::<f64>();
     let mean_a = sum(&|a, _| brightness(a)) / count;
@@ -113,7 +116,8 @@ pub fn with_bake(a: &BakedScene, b: &BakedScene) -> Result<PairComparison, Compa
     let figures = PairFigures {
         quantity: if light == Light::Stored { a.quantity() } else { Quantity::Irradiance },
         points: pairs.len(),
-        unmatched: places.len() - pairs.len(),
+        unmatched: seen.len() - pairs.len(),
+        hidden: total - seen.len(),
         mean_a,
         mean_b,
         rel_l2: ratio(sum(&|a, b| (b - a).length_squared()).sqrt(), sum(&|a, _| a.length_squared()).sqrt()),
