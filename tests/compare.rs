@@ -286,7 +286,7 @@ fn stored_archives_of_doubles_are_read_and_what_is_elsewhere_is_counted() {
     assert_eq!((&found["unmatched"], &found["uniform"]["n"]), (&1.into(), &1.into()));
     assert!(found.get("contact").is_none());
     // From below, the floor is no surface.
-    write(-1.0).refused(1, &["none of the 2 points", "cornell-64.glb", "the same scene"]);
+    write(-1.0).refused(1, &["only 0 of the 2 points", "cornell-64.glb", "the same scene"]);
 }
 
 /// The names that build steps rely on, where people look for them.

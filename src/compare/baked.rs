@@ -203,6 +203,15 @@ impl BakedScene {
     }
 }
 
+/// Fails where less than half of the points that were looked up in `baked` were found: of figures for
+/// the rest nobody should draw conclusions.
+pub(super) fn check_matched(baked: &BakedScene, matched: usize, points: usize) -> Result<(), CompareError> {
+    if matched == 0 || 2 * matched < points {
+        return Err(CompareError::FewMatched { path: baked.path.clone(), matched, points });
+    }
+    Ok(())
+}
+
 fn page_of_node(scene: &Scene, node: usize) -> Option<usize> {
     let node = scene.source.json.get("nodes")?.get(node)?;
     let page = node.get("extensions")?.get(COBAKE_LIGHTMAP)?.get("lightmap")?.as_u64()?;

@@ -104,15 +104,17 @@ pub enum CompareError {
         fault: NpyFault,
     },
 
-    /// Nothing of one thing was found in the other.
+    /// Most of one thing was not found in the other.
     #[error(
-        "none of the {points} points looked up lie on surfaces of {}; compare files of the same scene",
+        "only {matched} of the {points} points looked up lie on surfaces of {}; compare files of the same scene",
         path.display()
     )]
-    NothingMatched {
+    FewMatched {
         /// The bake that the points were looked up in.
         path: PathBuf,
-        /// How many.
+        /// How many lie on its surfaces.
+        matched: usize,
+        /// How many were looked up.
         points: usize,
     },
 

@@ -187,21 +187,37 @@ impl Kernels {
         let across: Vec<Vec<[f64; 7]>> = rows.map(|r| self.across(picture, row(r))).collect();
         let mut seen = Vec::with_capacity(band.len() * picture.width);
         for line in 0..band.len() {
-            for x in 0..picture.width {
-                let down = |kernel: &[f64], channel: usize| -> f64 {
-                    let start = line + reach - kernel.len() / 2;
-                    kernel.iter().zip(&across[start..]).map(|(w, row)| w * row[x][channel]).sum()
-                };
-                let [achromatic, red_green, blue, yellow] = &self.spatial;
-                let (y, cx) = (down(achromatic, 0), down(red_green, 1));
-                let cz = down(blue, 2) + down(yellow, 3);
-                let edge = down(&self.gaussian, 4).hypot(down(&self.first_derivative, 6));
-                let point = down(&self.gaussian, 5).hypot(down(&self.second_derivative, 6));
-                let colour = hunt(screen(DVec3::new(y, cx, cz), self.to_rgb));
-                seen.push(Seen { colour, edge, point });
+            let Some(rows) = across.get(line..=line + 2 * reach) else { continue };
+            for sums in self.down(rows, reach, picture.width) {
+                let [y, cx, blue, yellow, dx, dy, ddx, ddy] = sums;
+                let colour = hunt(screen(DVec3::new(y, cx, blue + yellow), self.to_rgb));
+                seen.push(Seen { colour, edge: dx.hypot(dy), point: ddx.hypot(ddy) });
             }
         }
         seen
+    }
+
+    /// Filters rows that were filtered [`across`](Self::across) down to the one in their middle: the four
+    /// spatial channels, then luminance's first derivative across and down, and its second.
+    fn down(&self, rows: &[Vec<[f64; 7]>], reach: usize, width: usize) -> Vec<[f64; 8]> {
+        let weight = |kernel: &[f64], k: usize| {
+            let index = (k + kernel.len() / 2).checked_sub(reach);
+            index.and_then(|index| kernel.get(index)).copied().unwrap_or(0.0)
+        };
+        let mut sums = vec![[0.0; 8]; width];
+        for (k, row) in rows.iter().enumerate() {
+            let [y, cx, blue, yellow] = self.spatial.each_ref().map(|kernel| weight(kernel, k));
+            let gaussian = weight(&self.gaussian, k);
+            let (first, second) = (weight(&self.first_derivative, k), weight(&self.second_derivative, k));
+            let weights = [y, cx, blue, yellow, gaussian, first, gaussian, second];
+            for (sum, &[y, cx, blue, yellow, dx, ddx, smooth]) in sums.iter_mut().zip(row) {
+                let values = [y, cx, blue, yellow, dx, smooth, ddx, smooth];
+                for ((sum, value), weight) in sum.iter_mut().zip(values).zip(weights) {
+                    *sum += weight * value;
+                }
+            }
+        }
+        sums
     }
 
     /// One row filtered along itself: the four spatial kernels, then luminance by the first and the
@@ -212,27 +228,28 @@ impl Kernels {
             picture.pixels[start..start + picture.width].iter().map(|&pixel| ycxcz(pixel)).collect();
         let luminance = |pixel: &DVec3| (pixel.x + 16.0) / 116.0;
         let [achromatic, red_green, blue, yellow] = &self.spatial;
-        (0..line.len())
-            .map(|x| {
-                [
-                    along(&line, x, achromatic, |pixel| pixel.x),
-                    along(&line, x, red_green, |pixel| pixel.y),
-                    along(&line, x, blue, |pixel| pixel.z),
-                    along(&line, x, yellow, |pixel| pixel.z),
-                    along(&line, x, &self.first_derivative, luminance),
-                    along(&line, x, &self.second_derivative, luminance),
-                    along(&line, x, &self.gaussian, luminance),
-                ]
-            })
-            .collect()
+        let columns = [
+            along(&line, achromatic, |pixel| pixel.x),
+            along(&line, red_green, |pixel| pixel.y),
+            along(&line, blue, |pixel| pixel.z),
+            along(&line, yellow, |pixel| pixel.z),
+            along(&line, &self.first_derivative, luminance),
+            along(&line, &self.second_derivative, luminance),
+            along(&line, &self.gaussian, luminance),
+        ];
+        (0..line.len()).map(|x| columns.each_ref().map(|column| column[x])).collect()
     }
 }
 
-/// The sum of `kernel` times `value` around pixel `x` of a row.
-fn along(line: &[DVec3], x: usize, kernel: &[f64], value: impl Fn(&DVec3) -> f64) -> f64 {
+/// A channel of a row filtered along it; beyond its ends it goes on as it ends.
+fn along(line: &[DVec3], kernel: &[f64], value: impl Fn(&DVec3) -> f64) -> Vec<f64> {
     let radius = kernel.len() / 2;
-    let pixel = |k: usize| (x + k).saturating_sub(radius).min(line.len() - 1);
-    kernel.iter().enumerate().map(|(k, weight)| weight * value(&line[pixel(k)])).sum()
+    let last = line.len().saturating_sub(1);
+    let padded: Vec<f64> = (0..line.len() + 2 * radius)
+        .map(|x| line.get(x.saturating_sub(radius).min(last)).map_or(0.0, &value))
+        .collect();
+    let sum = |window: &[f64]| window.iter().zip(kernel).map(|(value, weight)| value * weight).sum();
+    padded.windows(kernel.len()).map(sum).collect()
 }
 
 fn weights(radius: i32, weight: impl Fn(f64) -> f64) -> Vec<f64> {

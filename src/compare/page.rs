@@ -68,7 +68,7 @@ impl PageLight {
             let Some((_, barycentric)) = shown.map(|corners| nearest(corners, centre)) else {
                 return TexelLight::Empty;
             };
-            let place = Place { triangle: triangle as usize, barycentric };
+            let place = Place { triangle: triangle as usize, barycentric: off_edges(barycentric) };
             if first.is_hidden(&place) {
                 return TexelLight::Empty;
             }
@@ -124,6 +124,14 @@ impl PageLight {
             TexelLight::Empty | TexelLight::Unmatched(_) => None,
         })
     }
+}
+
+/// Moves a place off its triangle's edges: from there, a neighbour with another chart is as near.
+fn off_edges(barycentric: [f64; 3]) -> [f64; 3] {
+    const LEAST: f64 = 1e-4;
+    let raised = barycentric.map(|weight| weight.max(LEAST));
+    let sum: f64 = raised.iter().sum();
+    raised.map(|weight| weight / sum)
 }
 
 /// A triangle's corners on the first page, texels.

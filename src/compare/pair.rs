@@ -4,6 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::baked::check_matched;
 use super::figures::{DARK, Percentiles, brightness, ratio};
 use super::page::{PageFigures, PageLight};
 use super::spread::places;
@@ -84,7 +85,7 @@ impl PairComparison {
 /// Compares bake `b` with bake `a`, whatever their atlases and triangles.
 ///
 /// # Errors
-/// [`CompareError::NothingMatched`] where no point of `a` lies on `b`, [`CompareError::Unlit`] where `a`'s
+/// [`CompareError::FewMatched`] where most points of `a` do not lie on `b`, [`CompareError::Unlit`] where `a`'s
 /// lit surfaces have no area that is seen.
 pub fn with_bake(a: &BakedScene, b: &BakedScene) -> Result<PairComparison, CompareError> {
     let light = if a.quantity() == b.quantity() { Light::Stored } else { Light::Irradiance };
@@ -101,9 +102,7 @@ pub fn with_bake(a: &BakedScene, b: &BakedScene) -> Result<PairComparison, Compa
     if seen.is_empty() {
         return Err(CompareError::Unlit { path: a.path().to_owned() });
     }
-    if pairs.is_empty() {
-        return Err(CompareError::NothingMatched { path: b.path().to_owned(), points: seen.len() });
-    }
+    check_matched(b, pairs.len(), seen.len())?;
     let page = PageLight::of(a, b, light).ok_or_else(|| CompareError::Unlit { path: a.path().to_owned() })?;
     let count = pairs.len() as f64;
     let sum = |term: &dyn Fn(DVec3, DVec3) -> f64| pairs.iter().map(|&(a, b)| term(a, b)).sum::<f64>();

@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::baked::check_matched;
 use super::figures::{Measured, SetFigures};
 use super::npz::Archive;
 use super::{BakedScene, CompareError};
@@ -131,7 +132,7 @@ impl ReferenceFigures {
 /// Compares a bake's irradiance with the points'.
 ///
 /// # Errors
-/// [`CompareError::NothingMatched`] where no point lies on the bake's surfaces.
+/// [`CompareError::FewMatched`] where most points do not lie on the bake's surfaces.
 pub fn with_reference(
     baked: &BakedScene,
     reference: &ReferencePoints,
@@ -145,9 +146,7 @@ pub fn with_reference(
     };
     let measured: Vec<Option<(Set, Measured)>> = seen.par_iter().map(measure).collect();
     let matched: Vec<(Set, Measured)> = measured.into_iter().flatten().collect();
-    if matched.is_empty() {
-        return Err(CompareError::NothingMatched { path: baked.path().to_owned(), points: seen.len() });
-    }
+    check_matched(baked, matched.len(), seen.len())?;
     let of = |asked: Set| {
         let points: Vec<Measured> =
             matched.iter().filter(|(set, _)| *set == asked).map(|(_, point)| *point).collect();
