@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 21] = [
+const OPTIONS: [&str; 22] = [
     "--output",
     "--size",
     "--texels-per-metre",
@@ -31,6 +31,7 @@ const OPTIONS: [&str; 21] = [
     "--no-shaft-test",
     "--no-umbra-test",
     "--unshot-fraction",
+    "--gather-error",
     "--padding",
     "--scene",
     "--quiet",
