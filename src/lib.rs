@@ -1,6 +1,7 @@
 //! cobake bakes lightmaps: glTF in, glTF with EXR lightmaps out.
 mod bake;
 pub mod cob;
+pub mod compare;
 pub mod element;
 pub mod error;
 pub mod export;

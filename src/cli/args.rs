@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cobake::options::{BakeOptions, CobHeight, Direct, Quantity, Refine, Resolution, Toggle, Topology};
 
+use super::compare_args::CompareArgs;
+
 /// Bakes lightmaps into glTF scenes: radiosity on a mesh that refines itself near close occluders.
 #[derive(Debug, Parser)]
 #[command(name = "cobake", version, arg_required_else_help = true, after_help = AFTER_HELP)]
@@ -14,7 +16,7 @@ pub(crate) struct Cli {
 }
 
 const AFTER_HELP: &str = "\
-Exit codes: 0 done, 1 failed, 2 wrong use, 130 cancelled by Ctrl-C.
+Exit codes: 0 done, 1 failed, 2 wrong use, 3 a comparison above --fail-above, 130 cancelled by Ctrl-C.
 COBAKE_LOG=error|warn|info|debug|trace writes the stages' log to stderr.";
 
 /// What to do.
@@ -22,6 +24,8 @@ COBAKE_LOG=error|warn|info|debug|trace writes the stages' log to stderr.";
 pub(crate) enum Command {
     /// Bake a scene's lightmap into a new file
     Bake(Box<BakeArgs>),
+    /// Tell how far a bake is from reference points, or from another bake
+    Compare(CompareArgs),
 }
 
 /// The words after `bake`. Each option is described in [`BakeOptions`] in the same words.
@@ -242,7 +246,7 @@ mod tests {
     fn options(words: &str) -> BakeOptions {
         let line = format!("cobake bake in.glb -o out.glb {words}");
         let cli = Cli::try_parse_from(line.split_whitespace()).expect("valid");
-        let Command::Bake(args) = cli.command;
+        let Command::Bake(args) = cli.command else { panic!("a bake") };
         BakeOptions::from(&*args)
     }
 

@@ -8,6 +8,8 @@ use cobake::error::Error;
 pub(crate) const FAILED: u8 = 1;
 /// Exit code: the command line makes no sense.
 pub(crate) const WRONG_USE: u8 = 2;
+/// Exit code: the comparison went through and found more than it was told to allow.
+pub(crate) const TOO_FAR: u8 = 3;
 /// Exit code: the user asked to stop (128 + SIGINT, as shells have it).
 pub(crate) const CANCELLED: u8 = 130;
 
@@ -16,10 +18,18 @@ pub(crate) const CANCELLED: u8 = 130;
 #[error("{0}")]
 pub(crate) struct WrongUse(pub(crate) String);
 
+/// A figure that is above `--fail-above`.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct TooFar(pub(crate) String);
+
 /// The exit code that tells a script what kind of failure this is.
 pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {
     if error.is::<WrongUse>() {
         return WRONG_USE;
+    }
+    if error.is::<TooFar>() {
+        return TOO_FAR;
     }
     match error.downcast_ref::<Error>() {
         Some(Error::Options(_)) => WRONG_USE,
@@ -58,6 +68,7 @@ mod tests {
         assert_eq!(exit_code(&anyhow::anyhow!("disk full")), 1);
         assert_eq!(exit_code(&WrongUse("no".into()).into()), 2);
         assert_eq!(exit_code(&wrong_option()), 2);
+        assert_eq!(exit_code(&TooFar("relL2 is 1".into()).into()), 3);
         assert_eq!(exit_code(&Error::Cancelled.into()), 130);
     }
 

@@ -51,6 +51,15 @@ impl Files<'_> {
     }
 }
 
+/// Finds out before the work whether its one result, called `name`, can be written without replacing an input.
+pub(crate) fn check_result(name: &str, result: &Path, inputs: &[&Path]) -> anyhow::Result<()> {
+    if let Some(input) = inputs.iter().find(|input| identity(input) == identity(result)) {
+        let message = format!("{name} would replace {}; give it another name", input.display());
+        return Err(WrongUse(message).into());
+    }
+    check_target(result)
+}
+
 /// What tells whether two paths lead to one file, existing or not: links resolved as far as the path exists.
 fn identity(path: &Path) -> PathBuf {
     if let Ok(found) = fs::canonicalize(path) {

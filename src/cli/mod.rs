@@ -5,11 +5,14 @@
 
 mod args;
 mod bake;
+mod compare;
+mod compare_args;
 mod failure;
 mod files;
 mod interrupt;
 mod log;
 mod summary;
+mod table;
 mod terminal;
 
 use std::ffi::OsString;
@@ -46,5 +49,6 @@ pub(crate) fn main(name: &'static str, arguments: Vec<OsString>) -> ExitCode {
 fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Bake(arguments) => bake::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
     }
 }

@@ -1,4 +1,4 @@
-//! What a person sees on stderr while a bake runs.
+//! What a person sees on stderr while a bake runs, and what a command answers on stdout.
 
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
@@ -16,6 +16,15 @@ const TEMPLATE: &str = "{prefix:>13} [{bar:32}] {percent:>3} %  {eta} left";
 /// Writes `line` to stderr. A closed stderr is no reason to fail.
 pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Writes `text`, a command's answer, to stdout. A reader that went away is no reason to fail.
+pub(crate) fn answer(text: &str) -> io::Result<()> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// Whether a person is watching.

@@ -15,7 +15,7 @@ use super::document::{Document, Object, edit_object, index_of};
 const MOZ_LIGHTMAP: &str = "MOZ_lightmap";
 
 /// The set that lightmap coordinates live in: loaders have it hard-coded.
-pub(super) const LIGHTMAP_SET: usize = 1;
+pub(crate) const LIGHTMAP_SET: usize = 1;
 
 /// What `MOZ_lightmap` will refer to.
 #[derive(Clone, Debug)]

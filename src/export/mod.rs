@@ -39,9 +39,11 @@ mod writer;
 
 pub use error::ExportError;
 pub use exr::{decode_exr, encode_exr};
+pub(crate) use materials::LIGHTMAP_SET;
 pub use png::{Png, encode_png};
 pub use verify::{lightmap_bytes, verify};
 pub use write::{write, write_whole};
+pub(crate) use writer::COBAKE_LIGHTMAP;
 
 use crate::options::BakeOptions;
 use crate::raster::Lightmap;

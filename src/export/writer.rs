@@ -15,7 +15,7 @@ use crate::options::{BakeOptions, Quantity, Topology};
 use crate::scene::Placement;
 
 /// Our own extension: on the root the lightmaps, on nodes which one lights them.
-pub(super) const COBAKE_LIGHTMAP: &str = "COBAKE_lightmap";
+pub(crate) const COBAKE_LIGHTMAP: &str = "COBAKE_lightmap";
 
 /// What is written, and what of it can be shared.
 pub(super) struct Writer<'a> {

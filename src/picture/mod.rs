@@ -14,6 +14,7 @@ mod tone;
 pub use bake::{Picture, Subject, pictures};
 pub use drawing::{Cell, Line, MeshDrawing};
 pub use lightmap::lightmap_png;
+pub(crate) use png::encode as encode_rgb;
 pub use tone::ToneMap;
 
 /// A colour of a picture: sRGB, 0 to 255.

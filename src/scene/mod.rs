@@ -15,6 +15,7 @@
 mod accessor;
 mod appearance;
 mod container;
+mod coordinates;
 mod document;
 mod error;
 mod extension;
