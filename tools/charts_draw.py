@@ -25,8 +25,8 @@ PEERS = {
 POLICIES = {"cob": BLUE, "gradient": ORANGE, "cob+gradient": GREEN, "uniform": BLACK}
 SETS = {
     "uniform": "all points",
-    "contact": "points near a contact",
-    "detail": "points near a contact in strong light",
+    "contact": "near a contact",
+    "detail": "contact, strong light",
 }
 ERROR = "relative RMS error of irradiance, %"
 SECONDS = "CPU seconds"
@@ -51,8 +51,13 @@ def read_peers(path):
 
 
 def plain(axis):
-    """Log ticks at 1, 2 and 5, written as plain numbers."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=20))
+    """Log ticks at 1, 2 and 5, or closer where the axis is short, written as plain numbers."""
+    low, high = axis.get_view_interval()
+    span = high / low
+    subs = (1, 2, 5)
+    if span < 12:
+        subs = (1, 1.5, 2, 3, 4, 5, 7) if span > 3 else (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 7, 8, 9)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=20))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
     axis.set_minor_formatter(NullFormatter())
 
@@ -207,8 +212,8 @@ def draw_blocker(rows, folder):
             points = sorted((row["height"], row["elements"]) for row in group)
             if points:
                 count.plot(*zip(*points), **style)
-        log_axes(error)
-        log_axes(count)
+        log_axes(error, x_ticks_by_decade=True)
+        log_axes(count, x_ticks_by_decade=True)
         error.set_title(f"blocker of {100 * side:g} cm: error near its outline")
         count.set_title(f"blocker of {100 * side:g} cm: size of the mesh")
         error.set_ylabel(ERROR)
