@@ -196,11 +196,11 @@ def draw_blocker(rows, folder):
     figure, grid = plt.subplots(len(sides), 2, figsize=(11.5, 3.9 * len(sides)), layout="constrained", sharex=True,
                                 squeeze=False)  # fmt: skip
     styles = {
-        ("none", 1.0): dict(color=BLACK, linestyle=":", marker="x", label="--refine none"),
+        ("none", 1.0): dict(color=BLACK, linestyle=":", marker="x", zorder=4, label="--refine none"),
         ("gradient", 1.0): dict(color=ORANGE, marker="s", label="--refine gradient"),
         ("cob+gradient", 1.0): dict(color=GREEN, marker="D", linewidth=2.2, label="--refine cob+gradient\n(default)"),
     }
-    blues = {0.1: "#c6dbef", 0.3: "#9ecae1", 1.0: "#0072B2", 3.0: "#2f5597", 10.0: "#08204a"}
+    blues = {0.1: "#a9cce8", 0.3: "#6baed6", 1.0: "#0072B2", 3.0: "#2f5597", 10.0: "#08204a"}
     for (fraction, color), marker in zip(blues.items(), "v<o>^"):
         styles["cob", fraction] = dict(
             color=color, marker=marker, linestyle="--", label=f"--refine cob\n--cob-height {fraction:g}"
