@@ -127,7 +127,7 @@ def sweep_time(bench, name):
     sizes, gather_errors = {
         "cornell": ((128, 256, 512, 1024), GATHER_ERRORS),
         "desk": ((256, 512, 1024), GATHER_ERRORS),
-        "office": ((512, 1024), (0.02, 0.007)),
+        "office": ((512, 1024), GATHER_ERRORS[:3]),
     }[name]
     for size in sizes:
         for error in gather_errors:
