@@ -69,9 +69,9 @@ const CLEARLY: f64 = 2.0;
 /// No element becomes this many times longer than wide by being split across.
 const MOST_SLENDER: f64 = 32.0;
 
-/// An element that is smaller than this fraction of the distance to what it sees is not asked about its middle:
-/// light curves by less than it may (Ward, Rubinstein and Clear 1988 bound it so).
-const FLAT: f64 = 0.25;
+/// An element that is smaller than the square root of the tolerance times this, in distances to what it sees, is not
+/// asked about its middle: light curves with the square of that (Ward, Rubinstein and Clear 1988).
+const FLAT: f64 = 1.34;
 
 /// A hot spot that gives less than this fraction of the light is left out.
 const HOT_NEGLIGIBLE: f64 = 2e-5;
@@ -180,7 +180,7 @@ impl Gathering<'_> {
         let values = places.map(|p| p.irradiance);
         let mut shading = self.facet.elements[element as usize].flat(values);
         let nearest = places.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
-        if size > FLAT * nearest && self.may_split(element) {
+        if size > FLAT * self.round.tolerance.sqrt() * nearest && self.may_split(element) {
             let middle = self.at(self.facet.centre(element));
             let e = &self.facet.elements[element as usize];
             let interpolated = shading.at(e.place(e.centroid));
