@@ -125,12 +125,6 @@ impl AreaEmitter {
         self.exitance * self.area
     }
 
-    /// The largest of its corners' products with `direction`.
-    #[must_use]
-    pub fn reach(&self, direction: DVec3) -> f64 {
-        self.hull.iter().map(|&p| direction.dot(p)).fold(f64::NEG_INFINITY, f64::max)
-    }
-
     /// The form factor from `receiver` with nothing between, in `[0, 1]`.
     #[must_use]
     pub fn unoccluded(&self, receiver: SurfacePoint) -> f64 {
@@ -262,15 +256,6 @@ impl Emitter {
                     }
                 }
             }
-        }
-    }
-
-    /// The form factor from `receiver` with nothing between; 0 for punctual lights, which have no extent.
-    #[must_use]
-    pub fn form_factor(&self, receiver: SurfacePoint) -> f64 {
-        match self {
-            Self::Area(area) => area.unoccluded(receiver),
-            Self::Punctual(_) => 0.0,
         }
     }
 
