@@ -79,6 +79,28 @@ fn mean_irradiance_follows_from_the_flux() {
     assert!((mean / expected - 1.0).abs() < 0.01, "{mean} instead of {expected}");
 }
 
+/// The same with the lamp close to a wall, whose brightest places send what they reflect in closed form: none of it
+/// is lost, and none counted twice.
+#[test]
+fn a_hot_spot_keeps_its_light() {
+    let reflectance = 0.6;
+    let walls = room(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0));
+    let lights = [PunctualLight {
+        kind: PunctualKind::Point { position: DVec3::new(0.06, 0.5, 0.5), range: f64::INFINITY },
+        intensity: DVec3::splat(3.0),
+        node: 0,
+    }];
+    let appearance = Uniform { reflectance, exitance: 0.0 };
+    let case =
+        Case { surfaces: &walls, appearance: &appearance, lights: &lights, patch_size: 0.2, threshold: 0.03 };
+    let solution = case.solve(&BakeOptions::default());
+    let area: f64 = walls.iter().map(|s| s.area).sum();
+    let leaves = leaves(&solution.facets);
+    let indirect = leaves.iter().map(|(a, _, i)| a * i.x).sum::<f64>() / area;
+    let expected = 3.0 * 4.0 * std::f64::consts::PI / area * reflectance / (1.0 - reflectance);
+    assert!((indirect / expected - 1.0).abs() < 0.01, "{indirect} instead of {expected}");
+}
+
 /// 5. A sphere with a point source at its centre: uniform, indirect = direct ρ / (1 − ρ).
 #[test]
 fn sphere_with_a_point_source() {
