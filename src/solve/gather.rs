@@ -12,8 +12,6 @@
 //! It costs the same in scenes of ten and of ten thousand surfaces, and where light is even it
 //! is exact, in corners and under contacts, too.
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -22,16 +20,12 @@ use super::emitter::AreaEmitter;
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
 use super::patches::Receiver;
-use super::sequence;
+use super::hemisphere::{Directions, Level};
 use crate::element::{Facet, NONE, Shading};
+use crate::geom::Frame;
 use crate::light::luminance;
 use crate::options::Refine;
-
-/// A place casts no fewer rays than this.
-const LEAST_RAYS: usize = 64;
-
-/// A place casts no more rays than this.
-const MOST_RAYS: usize = 4096;
+use crate::trace::{FAN, Fan, FanStack, Tracer};
 
 /// How far a round goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,7 +108,8 @@ pub fn gather(
     round: Round,
     facets: &mut [Facet],
 ) -> GatherCounts {
-    let directions = directions();
+    let directions = Directions::new();
+    let arch = pulp::Arch::new();
     let counts: Vec<GatherCounts> = facets
         .par_iter_mut()
         .zip(receivers)
@@ -125,13 +120,15 @@ pub fn gather(
                 source,
                 round,
                 directions: &directions,
-                rays: LEAST_RAYS,
+                level: Level::LEAST,
+                arch,
+                stack: FanStack::default(),
                 places: vec![None; facet.samples.len()],
                 facet,
                 counts: GatherCounts::default(),
             };
             for receiver in receivers {
-                gathering.rays = rays_for(receiver.contrast, round.noise);
+                gathering.level = level_for(receiver.contrast, round.noise);
                 gathering.receive(receiver.element);
             }
             gathering.counts
@@ -147,9 +144,11 @@ struct Gathering<'a> {
     pass: &'a DirectPass<'a>,
     source: Source<'a>,
     round: Round,
-    directions: &'a [DVec3],
+    directions: &'a Directions,
     /// How many of them a place takes.
-    rays: usize,
+    level: Level,
+    arch: pulp::Arch,
+    stack: FanStack,
     facet: &'a mut Facet,
     /// What the samples have gathered.
     places: Vec<Option<Gathered>>,
@@ -266,65 +265,60 @@ impl Gathering<'_> {
 
     fn at(&mut self, point: SurfacePoint) -> Gathered {
         let tracer = self.pass.tracer;
-        let frame = &self.facet.frame;
-        let origin = point.position;
-        let (mut sum, mut nearness) = (DVec3::ZERO, 0.0);
-        for d in &self.directions[..self.rays] {
-            let towards = d.x * frame.u + d.y * frame.v + d.z * frame.normal;
-            if let Some(hit) = tracer.closest_hit(origin, towards) {
-                sum += self.source.field.radiosity(tracer, &hit, origin + towards * hit.distance).as_dvec3();
-                nearness += 1.0 / hit.distance.max(tracer.margin());
-            }
-        }
+        let fans = self.directions.fans(self.level);
+        let (mean, nearness) = self.arch.dispatch(Look {
+            tracer,
+            field: self.source.field,
+            frame: self.facet.frame,
+            origin: point.position,
+            fans,
+            stack: &mut self.stack,
+        });
         self.counts.places += 1;
-        self.counts.rays += self.rays as u64;
-        let rays = self.rays as f64;
+        self.counts.rays += self.level.rays() as u64;
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
         let hot = self.source.hot_spots.iter().map(|s| s.irradiance_by_rays(point, tracer, negligible));
         let hot: DVec3 = hot.sum();
-        Gathered { irradiance: sum / rays + hot, distance: rays / nearness }
+        Gathered { irradiance: mean + hot, distance: 1.0 / nearness }
+    }
+}
+
+/// A place's rays, for [`pulp`] to make fit the processor.
+struct Look<'a> {
+    tracer: &'a Tracer,
+    field: &'a RadiosityField<'a>,
+    frame: Frame,
+    origin: DVec3,
+    fans: &'a [Fan],
+    stack: &'a mut FanStack,
+}
+
+impl pulp::NullaryFnOnce for Look<'_> {
+    /// Mean radiosity met, and mean nearness.
+    type Output = (DVec3, f64);
+
+    #[inline(always)]
+    fn call(self) -> (DVec3, f64) {
+        let axes = [self.frame.u, self.frame.v, self.frame.normal].map(|a| a.as_vec3a());
+        let (mut sum, mut nearness) = (DVec3::ZERO, 0.0);
+        for fan in self.fans {
+            let fan = fan.turned(axes);
+            let hits = self.tracer.closest_hits(self.origin, &fan, self.stack);
+            for (ray, hit) in hits.iter().enumerate() {
+                if let Some(hit) = hit {
+                    let point = self.origin + fan.direction(ray) * hit.distance;
+                    sum += self.field.radiosity(self.tracer, hit, point).as_dvec3();
+                    nearness += 1.0 / hit.distance.max(self.tracer.margin());
+                }
+            }
+        }
+        let rays = (self.fans.len() * FAN) as f64;
+        (sum / rays, nearness / rays)
     }
 }
 
 /// How many rays bring the error down to `noise` where single ones deviate by `contrast`: strata of the hemisphere
 /// make it fall with the power of 3/4.
-fn rays_for(contrast: f64, noise: f64) -> usize {
-    let rays = (contrast / noise).powf(4.0 / 3.0);
-    (rays as usize).next_multiple_of(LEAST_RAYS).clamp(LEAST_RAYS, MOST_RAYS)
-}
-
-/// Cosine-distributed directions about `z`.
-fn directions() -> Vec<DVec3> {
-    (0..MOST_RAYS as u32)
-        .map(|index| {
-            let [u, v, ..] = sequence::point(index, 0);
-            cosine_direction(u, v)
-        })
-        .collect()
-}
-
-/// Maps the unit square onto the hemisphere about `z`, cosine-distributed, neighbours to neighbours: the
-/// concentric map of Shirley and Chiu 1997, lifted.
-fn cosine_direction(u: f64, v: f64) -> DVec3 {
-    let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
-    let (radius, angle) = match () {
-        () if x.abs() > y.abs() => (x, FRAC_PI_4 * (y / x)),
-        () if y != 0.0 => (y, FRAC_PI_2 - FRAC_PI_4 * (x / y)),
-        () => (0.0, 0.0),
-    };
-    let (sin, cos) = angle.sin_cos();
-    DVec3::new(radius * cos, radius * sin, (1.0 - radius * radius).max(0.0).sqrt())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn directions_are_cosine_distributed() {
-        let all = directions();
-        let mean: DVec3 = all.iter().sum::<DVec3>() / all.len() as f64;
-        assert!((mean - DVec3::new(0.0, 0.0, 2.0 / 3.0)).length() < 1e-3, "{mean}");
-        assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-12));
-    }
+fn level_for(contrast: f64, noise: f64) -> Level {
+    Level::of((contrast / noise).powf(4.0 / 3.0)).max(Level::LEAST)
 }

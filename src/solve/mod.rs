@@ -12,6 +12,7 @@ pub mod exchange;
 pub mod field;
 pub mod form_factor;
 pub mod gather;
+pub mod hemisphere;
 pub mod hot;
 pub mod locate;
 pub mod patches;

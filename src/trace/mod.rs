@@ -15,7 +15,10 @@ use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 
+mod fan;
 pub mod shaft;
+
+pub use fan::{FAN, Fan, FanStack};
 
 use crate::geom::Bounds;
 
@@ -45,6 +48,8 @@ pub struct Tracer {
     boxes: Bvh2,
     /// In the order of `rays.primitive_indices`.
     ordered: Vec<Facing>,
+    /// In the order of `boxes.primitive_indices`.
+    leaves: Vec<Facing>,
     triangles: Vec<[DVec3; 3]>,
     /// Empty where no triangle is double-sided.
     double_sided: Vec<bool>,
@@ -90,17 +95,15 @@ impl Tracer {
         let params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
         let boxes = build_bvh2(&boxed, params, &mut build_time);
         let rays = bvh2_to_cwbvh(&boxes, 3, true, false);
-        let ordered = rays
-            .primitive_indices
-            .iter()
-            .map(|&i| {
-                let t = triangles[i as usize];
-                let corner = local(t[0]);
-                Facing { corner, edge1: local(t[1]) - corner, edge2: local(t[2]) - corner }
-            })
-            .collect();
+        let facing = |&i: &u32| {
+            let t = triangles[i as usize];
+            let corner = local(t[0]);
+            Facing { corner, edge1: local(t[1]) - corner, edge2: local(t[2]) - corner }
+        };
+        let ordered = rays.primitive_indices.iter().map(facing).collect();
+        let leaves = boxes.primitive_indices.iter().map(facing).collect();
         let double_sided = Vec::new();
-        Self { rays, boxes, ordered, triangles, double_sided, centre, scale, diagonal }
+        Self { rays, boxes, ordered, leaves, triangles, double_sided, centre, scale, diagonal }
     }
 
     /// Marks the triangles whose backs are surfaces like their fronts, in the order given to [`new`](Self::new).
