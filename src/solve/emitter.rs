@@ -9,8 +9,8 @@ use super::visible::{ConvexParts, Workspace, visible_form_factor};
 use crate::geom::Frame;
 use crate::geom::hull::convex_hull;
 use crate::scene::{PunctualKind, PunctualLight};
-use crate::trace::Tracer;
 use crate::trace::shaft::Shaft;
+use crate::trace::{FAN, FanStack, Tracer};
 
 /// How hard to look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,6 +95,7 @@ impl Effort {
 /// Memory and counters for evaluating emitters.
 pub struct Evaluation {
     workspace: Workspace,
+    stack: FanStack,
     precision: Precision,
     /// What was done so far.
     pub effort: Effort,
@@ -104,7 +105,8 @@ impl Evaluation {
     /// Nothing done yet.
     #[must_use]
     pub fn new(precision: Precision) -> Self {
-        Self { workspace: Workspace::default(), precision, effort: Effort::default() }
+        let (workspace, stack) = (Workspace::default(), FanStack::default());
+        Self { workspace, stack, precision, effort: Effort::default() }
     }
 }
 
@@ -137,12 +139,18 @@ impl AreaEmitter {
     /// The irradiance that it gives to `receiver`, visibility counted by a few rays; zero where it would give no
     /// more than `negligible` with nothing between.
     #[must_use]
-    pub fn irradiance_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, negligible: f64) -> DVec3 {
+    pub fn irradiance_by_rays(
+        &self,
+        receiver: SurfacePoint,
+        tracer: &Tracer,
+        negligible: f64,
+        e: &mut Evaluation,
+    ) -> DVec3 {
         let arriving = self.exitance * self.unoccluded(receiver);
         if arriving.max_element() <= negligible {
             return DVec3::ZERO;
         }
-        arriving * self.fraction_by_rays(receiver, tracer, &mut Evaluation::new(Precision::HOT_SPOT))
+        arriving * self.fraction_by_rays(receiver, tracer, e)
     }
 
     fn visible(
@@ -179,21 +187,34 @@ impl AreaEmitter {
             let share = fan_area(part) / whole;
             let side = ((f64::from(most) * share.sqrt()).ceil() as u32).clamp(1, most);
             let area = share / f64::from(side * side);
-            for k in 0..side * side {
+            let point = |k: u32| {
                 let u = (f64::from(k % side) + 0.5) / f64::from(side);
                 let v = (f64::from(k / side) + 0.5) / f64::from(side);
-                let q = point_in_fan(part, u, v);
+                point_in_fan(part, u, v)
+            };
+            let mut rays = (0..side * side).filter_map(|k| {
+                let q = point(k);
                 let d = q - receiver.position;
                 let square = d.length_squared();
                 let kernel = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0)
                     / (square * square);
-                if kernel > 0.0 {
-                    all += kernel * area;
-                    e.effort.rays += 1;
-                    if !tracer.occluded(receiver.position, q + self.frame.normal * tracer.margin()) {
-                        seen += kernel * area;
-                    }
+                (kernel > 0.0).then(|| (q + self.frame.normal * tracer.margin(), kernel * area))
+            });
+            loop {
+                let (mut to, mut weights, mut count) = ([DVec3::ZERO; FAN], [0.0; FAN], 0);
+                for (point, weight) in rays.by_ref().take(FAN) {
+                    (to[count], weights[count]) = (point, weight);
+                    count += 1;
                 }
+                if count == 0 {
+                    break;
+                }
+                let occluded = tracer.occluded_all(receiver.position, &to[..count], &mut e.stack);
+                for (weight, occluded) in weights.iter().zip(occluded) {
+                    all += weight;
+                    seen += if occluded { 0.0 } else { *weight };
+                }
+                e.effort.rays += count as u64;
             }
         }
         if all > 0.0 { seen / all } else { 0.0 }

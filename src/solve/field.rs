@@ -1,6 +1,6 @@
 //! What every point of the scene reflects: the light that rays gather.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::hot::HotSpots;
@@ -20,19 +20,22 @@ pub struct RadiosityField<'a> {
 
 struct FacetField {
     descent: Descent,
+    /// The facet's least corner, metres.
+    min: DVec2,
     /// By element; only leaves are ever asked.
     patches: Vec<FieldPatch>,
+    /// By element, what the cap took, mean.
+    excess: Vec<Vec3>,
 }
 
 #[derive(Clone, Copy, Default)]
 struct FieldPatch {
-    min: DVec2,
-    per_size: DVec2,
+    /// Least corner, from the facet's.
+    min: Vec2,
+    per_size: Vec2,
     corners: [Vec3; 4],
     /// As of [`Shading`](crate::element::Shading).
     bulge: Vec3,
-    /// What the cap took, mean.
-    excess: Vec3,
 }
 
 impl<'a> RadiosityField<'a> {
@@ -53,7 +56,7 @@ impl<'a> RadiosityField<'a> {
     pub fn mean_excess(&self, index: usize, facet: &Facet, element: u32) -> DVec3 {
         let leaves = facet.leaves_of(element);
         let area = |leaf: u32| facet.elements[leaf as usize].area;
-        let excess = |leaf: u32| self.facets[index].patches[leaf as usize].excess.as_dvec3();
+        let excess = |leaf: u32| self.facets[index].excess[leaf as usize].as_dvec3();
         let sum: DVec3 = leaves.iter().map(|&l| area(l) * excess(l)).sum();
         (sum / leaves.iter().map(|&l| area(l)).sum::<f64>()).max(DVec3::ZERO)
     }
@@ -71,7 +74,9 @@ impl<'a> RadiosityField<'a> {
 
 impl FacetField {
     fn new(facet: &Facet, is_hot: &[bool], direct_scale: DVec3, cap: f64) -> Self {
+        let min = facet.elements[0].min;
         let mut patches = vec![FieldPatch::default(); facet.elements.len()];
+        let mut excess = vec![Vec3::ZERO; facet.elements.len()];
         for leaf in facet.leaves() {
             let e = &facet.elements[leaf as usize];
             let radiosity = |p| {
@@ -79,21 +84,21 @@ impl FacetField {
                 e.reflectance * (direct * direct_scale + indirect)
             };
             let (corners, middle) = (e.corners().map(radiosity), radiosity(0.5 * (e.min + e.max)));
-            let whole = FieldPatch::of(e, corners, middle);
-            patches[leaf as usize] = if is_hot[leaf as usize] {
-                let capped = FieldPatch::of(e, corners.map(|c| capped(c, cap)), capped(middle, cap));
-                FieldPatch { excess: whole.mean() - capped.mean(), ..capped }
-            } else {
-                whole
-            };
+            let leaf = leaf as usize;
+            patches[leaf] = FieldPatch::new(e, min, corners, middle);
+            if is_hot[leaf] {
+                let whole = patches[leaf].mean();
+                patches[leaf] = FieldPatch::new(e, min, corners.map(|c| capped(c, cap)), capped(middle, cap));
+                excess[leaf] = whole - patches[leaf].mean();
+            }
         }
-        Self { descent: Descent::new(facet), patches }
+        Self { descent: Descent::new(facet), min, patches, excess }
     }
 
     #[inline]
     fn radiosity(&self, p: DVec2) -> Vec3 {
-        let patch = &self.patches[self.descent.find(p, |_| false) as usize];
-        let t = ((p - patch.min) * patch.per_size).clamp(DVec2::ZERO, DVec2::ONE).as_vec2();
+        let patch = &self.patches[self.descent.leaf(p) as usize];
+        let t = (((p - self.min).as_vec2() - patch.min) * patch.per_size).clamp(Vec2::ZERO, Vec2::ONE);
         let [a, b, c, d] = patch.corners;
         let s = 2.0 * t - 1.0;
         a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y) + patch.bulge * (1.0 - 0.5 * s.length_squared())
@@ -101,10 +106,13 @@ impl FacetField {
 }
 
 impl FieldPatch {
-    fn of(e: &Element, corners: [DVec3; 4], middle: DVec3) -> Self {
-        let bulge = (middle - 0.25 * corners.iter().sum::<DVec3>()).as_vec3();
-        let corners = corners.map(|c| c.as_vec3());
-        Self { min: e.min, per_size: 1.0 / (e.max - e.min), corners, bulge, excess: Vec3::ZERO }
+    fn new(e: &Element, facet_min: DVec2, corners: [DVec3; 4], middle: DVec3) -> Self {
+        Self {
+            min: (e.min - facet_min).as_vec2(),
+            per_size: (1.0 / (e.max - e.min)).as_vec2(),
+            bulge: (middle - 0.25 * corners.iter().sum::<DVec3>()).as_vec3(),
+            corners: corners.map(|c| c.as_vec3()),
+        }
     }
 
     fn mean(&self) -> Vec3 {

@@ -16,16 +16,16 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::direct::DirectPass;
-use super::emitter::AreaEmitter;
+use super::emitter::{AreaEmitter, Evaluation, Precision};
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
-use super::patches::Receiver;
 use super::hemisphere::{Directions, Level};
+use super::patches::Receiver;
 use crate::element::{Facet, NONE, Shading};
 use crate::geom::Frame;
 use crate::light::luminance;
 use crate::options::Refine;
-use crate::trace::{FAN, Fan, FanStack, Tracer};
+use crate::trace::FanStack;
 
 /// How far a round goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,7 +109,6 @@ pub fn gather(
     facets: &mut [Facet],
 ) -> GatherCounts {
     let directions = Directions::new();
-    let arch = pulp::Arch::new();
     let counts: Vec<GatherCounts> = facets
         .par_iter_mut()
         .zip(receivers)
@@ -121,8 +120,8 @@ pub fn gather(
                 round,
                 directions: &directions,
                 level: Level::LEAST,
-                arch,
                 stack: FanStack::default(),
+                evaluation: Evaluation::new(Precision::HOT_SPOT),
                 places: vec![None; facet.samples.len()],
                 facet,
                 counts: GatherCounts::default(),
@@ -131,6 +130,7 @@ pub fn gather(
                 gathering.level = level_for(receiver.contrast, round.noise);
                 gathering.receive(receiver.element);
             }
+            gathering.counts.rays += gathering.evaluation.effort.rays;
             gathering.counts
         })
         .collect();
@@ -147,8 +147,9 @@ struct Gathering<'a> {
     directions: &'a Directions,
     /// How many of them a place takes.
     level: Level,
-    arch: pulp::Arch,
     stack: FanStack,
+    /// For hot spots.
+    evaluation: Evaluation,
     facet: &'a mut Facet,
     /// What the samples have gathered.
     places: Vec<Option<Gathered>>,
@@ -266,54 +267,21 @@ impl Gathering<'_> {
     fn at(&mut self, point: SurfacePoint) -> Gathered {
         let tracer = self.pass.tracer;
         let fans = self.directions.fans(self.level);
-        let (mean, nearness) = self.arch.dispatch(Look {
-            tracer,
-            field: self.source.field,
-            frame: self.facet.frame,
-            origin: point.position,
-            fans,
-            stack: &mut self.stack,
+        let Frame { u, v, normal, .. } = self.facet.frame;
+        let (mut sum, mut nearness) = (DVec3::ZERO, 0.0);
+        let Source { field, hot_spots } = self.source;
+        tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at| {
+            sum += field.radiosity(tracer, hit, at).as_dvec3();
+            nearness += 1.0 / hit.distance.max(tracer.margin());
         });
+        let rays = self.level.rays() as f64;
         self.counts.places += 1;
         self.counts.rays += self.level.rays() as u64;
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
-        let hot = self.source.hot_spots.iter().map(|s| s.irradiance_by_rays(point, tracer, negligible));
+        let hot =
+            hot_spots.iter().map(|s| s.irradiance_by_rays(point, tracer, negligible, &mut self.evaluation));
         let hot: DVec3 = hot.sum();
-        Gathered { irradiance: mean + hot, distance: 1.0 / nearness }
-    }
-}
-
-/// A place's rays, for [`pulp`] to make fit the processor.
-struct Look<'a> {
-    tracer: &'a Tracer,
-    field: &'a RadiosityField<'a>,
-    frame: Frame,
-    origin: DVec3,
-    fans: &'a [Fan],
-    stack: &'a mut FanStack,
-}
-
-impl pulp::NullaryFnOnce for Look<'_> {
-    /// Mean radiosity met, and mean nearness.
-    type Output = (DVec3, f64);
-
-    #[inline(always)]
-    fn call(self) -> (DVec3, f64) {
-        let axes = [self.frame.u, self.frame.v, self.frame.normal].map(|a| a.as_vec3a());
-        let (mut sum, mut nearness) = (DVec3::ZERO, 0.0);
-        for fan in self.fans {
-            let fan = fan.turned(axes);
-            let hits = self.tracer.closest_hits(self.origin, &fan, self.stack);
-            for (ray, hit) in hits.iter().enumerate() {
-                if let Some(hit) = hit {
-                    let point = self.origin + fan.direction(ray) * hit.distance;
-                    sum += self.field.radiosity(self.tracer, hit, point).as_dvec3();
-                    nearness += 1.0 / hit.distance.max(self.tracer.margin());
-                }
-            }
-        }
-        let rays = (self.fans.len() * FAN) as f64;
-        (sum / rays, nearness / rays)
+        Gathered { irradiance: sum / rays + hot, distance: rays / nearness }
     }
 }
 

@@ -64,7 +64,8 @@ impl Directions {
 
 /// The bits of both coordinates in turns, most significant first (Morton's order).
 fn interleaved(u: f64, v: f64) -> u32 {
-    let spread = |x: f64| (0..16).fold(0, |sum, bit| sum | ((((x * 65536.0) as u32 >> bit) & 1) << (2 * bit)));
+    let spread =
+        |x: f64| (0..16).fold(0, |sum, bit| sum | ((((x * 65536.0) as u32 >> bit) & 1) << (2 * bit)));
     spread(u) | (spread(v) << 1)
 }
 

@@ -1,6 +1,6 @@
 //! From what a ray met to the facet there, and to the element of its tree.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, UVec2, Vec2};
 
 use crate::element::{Facet, NONE, Side};
 use crate::geom::Ring;
@@ -13,6 +13,9 @@ const LEAST_SHARE: f64 = 1e-9;
 
 /// About this many cells stand for each facet of a surface.
 const CELLS_A_FACET: f64 = 16.0;
+
+/// About this many cells stand for each leaf of a facet.
+const CELLS_A_LEAF: f64 = 4.0;
 
 /// Finds facets.
 pub struct FacetLocator {
@@ -132,19 +135,33 @@ impl Places {
 
 /// A facet's tree, made for going down it fast.
 pub struct Descent {
+    /// What nodes are relative to: the facet's least corner, metres.
+    min: DVec2,
     nodes: Vec<Node>,
+    /// A grid over the facet: by cell the last node that holds all of it.
+    starts: Vec<u32>,
+    cells: UVec2,
+    cells_per_metre: Vec2,
 }
 
 struct Node {
-    middle: DVec2,
+    middle: Vec2,
     /// By quadrant: left or right, plus two for above; all [`NONE`] for a leaf.
     children: [u32; 4],
+}
+
+impl Node {
+    #[inline]
+    fn child(&self, p: Vec2) -> u32 {
+        self.children[usize::from(p.x >= self.middle.x) + 2 * usize::from(p.y >= self.middle.y)]
+    }
 }
 
 impl Descent {
     /// Prepares the facet's tree; nodes are numbered as its elements.
     #[must_use]
     pub fn new(facet: &Facet) -> Self {
+        let root = &facet.elements[0];
         let nodes = facet.elements.iter().map(|e| {
             let (middle, quarter) = (0.5 * (e.min + e.max), 0.25 * (e.max - e.min));
             let children = std::array::from_fn(|quadrant| {
@@ -159,20 +176,58 @@ impl Descent {
                 };
                 e.children().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(NONE)
             });
-            Node { middle, children }
+            Node { middle: (middle - root.min).as_vec2(), children }
         });
-        Self { nodes: nodes.collect() }
+        let nodes: Vec<Node> = nodes.collect();
+        let extent = root.max - root.min;
+        let leaves = facet.leaves().count() as f64;
+        let cells = (extent * (CELLS_A_LEAF * leaves / extent.element_product()).sqrt())
+            .ceil()
+            .clamp(DVec2::ONE, DVec2::splat(CELLS_A_LEAF * leaves));
+        let size = (extent / cells).as_vec2();
+        let cells = cells.as_uvec2();
+        let start = |x: u32, y: u32| {
+            let low = size * UVec2::new(x, y).as_vec2();
+            let (left, above) = (Vec2::new(size.x, 0.0), Vec2::new(0.0, size.y));
+            let mut at = 0;
+            loop {
+                let [next, others @ ..] =
+                    [low, low + left, low + above, low + size].map(|p| nodes[at as usize].child(p));
+                if next == NONE || others != [next; 3] {
+                    return at;
+                }
+                at = next;
+            }
+        };
+        let starts =
+            (0..cells.y).flat_map(|y| (0..cells.x).map(move |x| (x, y))).map(|(x, y)| start(x, y)).collect();
+        Self { min: root.min, starts, cells, cells_per_metre: 1.0 / size, nodes }
+    }
+
+    /// The leaf at `p`, plane coordinates.
+    #[inline]
+    #[must_use]
+    pub fn leaf(&self, p: DVec2) -> u32 {
+        let p = (p - self.min).as_vec2();
+        let cell = (p * self.cells_per_metre).max(Vec2::ZERO);
+        let (x, y) = ((cell.x as u32).min(self.cells.x - 1), (cell.y as u32).min(self.cells.y - 1));
+        let mut at = self.starts[(y * self.cells.x + x) as usize];
+        loop {
+            let child = self.nodes[at as usize].child(p);
+            if child == NONE {
+                return at;
+            }
+            at = child;
+        }
     }
 
     /// The first element on the way down to `p` for which `is_goal` holds, or the leaf there.
-    #[inline]
     #[must_use]
     pub fn find(&self, p: DVec2, is_goal: impl Fn(u32) -> bool) -> u32 {
+        let p = (p - self.min).as_vec2();
         let mut at = 0;
         loop {
-            let node = &self.nodes[at as usize];
-            let quadrant = usize::from(p.x >= node.middle.x) + 2 * usize::from(p.y >= node.middle.y);
-            let child = node.children[quadrant];
+            let child = self.nodes[at as usize].child(p);
             if child == NONE || is_goal(at) {
                 return at;
             }

@@ -7,6 +7,7 @@
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
+use pulp::NullaryFnOnce;
 
 use super::{Facing, Hit, Tracer};
 
@@ -22,9 +23,9 @@ const NOTHING: u32 = u32::MAX;
 /// Unit vectors, by axis and ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Fan {
-    pub x: [f32; FAN],
-    pub y: [f32; FAN],
-    pub z: [f32; FAN],
+    x: [f32; FAN],
+    y: [f32; FAN],
+    z: [f32; FAN],
 }
 
 impl Fan {
@@ -59,7 +60,7 @@ impl Fan {
 
 /// What the rays of a fan met so far.
 struct Met {
-    /// Distance in obvhs's units.
+    /// Distance in obvhs's units; what lies beyond is not met.
     distance: [f32; FAN],
     /// Index in the tree's order, or [`NOTHING`].
     triangle: [u32; FAN],
@@ -67,44 +68,112 @@ struct Met {
     facing: [f32; FAN],
 }
 
-/// Boxes yet to be looked into, with the distance at which the first ray enters.
+/// Boxes yet to be looked into, with the distance at which the first ray enters: kept between fans so that their
+/// memory is.
 #[derive(Debug, Default)]
 pub struct FanStack(Vec<(u32, f32)>);
 
-impl Tracer {
-    /// The nearest triangle along each ray of a `fan` from `origin`.
-    #[inline(always)]
-    #[must_use]
-    pub fn closest_hits(&self, origin: DVec3, fan: &Fan, stack: &mut FanStack) -> [Option<Hit>; FAN] {
-        let met = self.meet(self.traced(origin), fan, stack);
-        std::array::from_fn(|ray| {
-            let triangle = met.triangle[ray];
-            (triangle != NOTHING).then(|| Hit {
-                triangle: self.boxes.primitive_indices[triangle as usize] as usize,
-                distance: f64::from(met.distance[ray]) / self.scale,
-                from_behind: met.facing[ray] < 0.0,
-            })
-        })
-    }
+/// The work of [`Tracer::look`], for [`pulp`] to compile for each kind of processor.
+struct Look<'a, V> {
+    tracer: &'a Tracer,
+    origin: DVec3,
+    axes: [Vec3A; 3],
+    fans: &'a [Fan],
+    stack: &'a mut FanStack,
+    visit: V,
+}
+
+impl<V: FnMut(&Hit, DVec3)> NullaryFnOnce for Look<'_, V> {
+    type Output = ();
 
     #[inline(always)]
-    fn meet(&self, origin: Vec3A, fan: &Fan, FanStack(stack): &mut FanStack) -> Met {
-        let mut met = Met { distance: [f32::MAX; FAN], triangle: [NOTHING; FAN], facing: [0.0; FAN] };
-        let nodes = &self.boxes.nodes[..];
-        let [ix, iy, iz] = [inverses(&fan.x), inverses(&fan.y), inverses(&fan.z)];
-        let entry = |aabb: &Aabb, distance: &[f32; FAN]| {
-            let (low, high) = (aabb.min - origin, aabb.max - origin);
-            let mut entries = [f32::INFINITY; FAN];
-            for i in 0..FAN {
-                let (ax, bx) = (low.x * ix[i], high.x * ix[i]);
-                let (ay, by) = (low.y * iy[i], high.y * iy[i]);
-                let (az, bz) = (low.z * iz[i], high.z * iz[i]);
-                let near = larger(larger(smaller(ax, bx), smaller(ay, by)), larger(smaller(az, bz), 0.0));
-                let far = smaller(smaller(larger(ax, bx), larger(ay, by)), smaller(larger(az, bz), distance[i]));
-                entries[i] = if near <= far * BOX_SLACK { near } else { f32::INFINITY };
+    fn call(mut self) {
+        let origin = self.tracer.traced(self.origin);
+        for fan in self.fans {
+            let fan = fan.turned(self.axes);
+            let mut met = Met::nothing_within([f32::MAX; FAN]);
+            self.tracer.meet(origin, &fan, self.stack, &mut met, |_| {});
+            for ray in (0..FAN).filter(|&ray| met.triangle[ray] != NOTHING) {
+                let hit = Hit {
+                    triangle: self.tracer.boxes.primitive_indices[met.triangle[ray] as usize] as usize,
+                    distance: f64::from(met.distance[ray]) / self.tracer.scale,
+                    from_behind: met.facing[ray] < 0.0,
+                };
+                (self.visit)(&hit, self.origin + fan.direction(ray) * hit.distance);
             }
-            reduce(entries, smaller)
-        };
+        }
+    }
+}
+
+/// The work of [`Tracer::occluded_all`], likewise.
+struct Shadows<'a> {
+    tracer: &'a Tracer,
+    from: DVec3,
+    to: &'a [DVec3],
+    stack: &'a mut FanStack,
+}
+
+impl NullaryFnOnce for Shadows<'_> {
+    type Output = [bool; FAN];
+
+    #[inline(always)]
+    fn call(self) -> [bool; FAN] {
+        let origin = self.tracer.traced(self.from);
+        let mut fan = Fan { x: [1.0; FAN], y: [1.0; FAN], z: [1.0; FAN] };
+        // Rays that are not asked for end before they begin.
+        let mut lengths = [-1.0; FAN];
+        for (ray, to) in self.to.iter().enumerate() {
+            let way = self.tracer.traced(*to) - origin;
+            lengths[ray] = way.length();
+            let direction = way / lengths[ray];
+            (fan.x[ray], fan.y[ray], fan.z[ray]) = (direction.x, direction.y, direction.z);
+        }
+        let mut met = Met::nothing_within(lengths);
+        // One hit is enough: such a ray looks no further.
+        self.tracer.meet(origin, &fan, self.stack, &mut met, |met| {
+            for ray in 0..FAN {
+                met.distance[ray] = if met.triangle[ray] == NOTHING { met.distance[ray] } else { -1.0 };
+            }
+        });
+        met.triangle.map(|t| t != NOTHING)
+    }
+}
+
+impl Tracer {
+    /// Tells `visit` the nearest triangle that each ray from `origin` meets, if any, and the point where. The
+    /// directions of `fans` are in a frame with these unit `axes`.
+    pub fn look(
+        &self,
+        origin: DVec3,
+        axes: [DVec3; 3],
+        fans: &[Fan],
+        stack: &mut FanStack,
+        visit: impl FnMut(&Hit, DVec3),
+    ) {
+        let axes = axes.map(|a| a.as_vec3a());
+        self.arch.dispatch(Look { tracer: self, origin, axes, fans, stack, visit });
+    }
+
+    /// For each of at most [`FAN`] points `to` whether a triangle stands between `from` and it. The caller keeps all
+    /// off their own surfaces.
+    #[must_use]
+    pub fn occluded_all(&self, from: DVec3, to: &[DVec3], stack: &mut FanStack) -> [bool; FAN] {
+        self.arch.dispatch(Shadows { tracer: self, from, to, stack })
+    }
+
+    /// Goes through the boxes that a ray enters nearer than what it met; `met_some` is called after a leaf's
+    /// triangles.
+    #[inline(always)]
+    fn meet(
+        &self,
+        origin: Vec3A,
+        fan: &Fan,
+        FanStack(stack): &mut FanStack,
+        met: &mut Met,
+        met_some: impl Fn(&mut Met),
+    ) {
+        let nodes = &self.boxes.nodes[..];
+        let inverse = Fan { x: inverses(&fan.x), y: inverses(&fan.y), z: inverses(&fan.z) };
         stack.clear();
         let mut farthest = f32::MAX;
         let mut next = (!nodes.is_empty()).then_some(0);
@@ -112,12 +181,14 @@ impl Tracer {
             let node = &nodes[index as usize];
             if node.is_leaf() {
                 for triangle in node.first_index..node.first_index + node.prim_count {
-                    self.leaves[triangle as usize].meet(triangle, origin, fan, &mut met);
+                    self.leaves[triangle as usize].meet(triangle, origin, fan, met);
                 }
+                met_some(met);
                 farthest = reduce(met.distance, larger);
             } else {
                 let children = [node.first_index, node.first_index + 1];
-                let [a, b] = children.map(|c| entry(nodes[c as usize].aabb(), &met.distance));
+                let a = entry(nodes[children[0] as usize].aabb(), origin, &inverse, &met.distance);
+                let b = entry(nodes[children[1] as usize].aabb(), origin, &inverse, &met.distance);
                 let (near, far) = if a <= b { (0, 1) } else { (1, 0) };
                 let entries = [a, b];
                 if entries[near] < f32::INFINITY {
@@ -135,7 +206,13 @@ impl Tracer {
                 }
             }
         }
-        met
+    }
+}
+
+impl Met {
+    #[inline(always)]
+    fn nothing_within(distance: [f32; FAN]) -> Self {
+        Self { distance, triangle: [NOTHING; FAN], facing: [0.0; FAN] }
     }
 }
 
@@ -154,12 +231,29 @@ impl Facing {
             let inverse = 1.0 / facing;
             let (u, v, distance) = (dot(of_u) * inverse, dot(of_v) * inverse, height * inverse);
             // NaN from a degenerate triangle fails every comparison.
-            let is_hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance >= 0.0) & (distance < met.distance[i]);
+            let is_hit =
+                (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance >= 0.0) & (distance < met.distance[i]);
             met.distance[i] = if is_hit { distance } else { met.distance[i] };
             met.triangle[i] = if is_hit { index } else { met.triangle[i] };
             met.facing[i] = if is_hit { facing } else { met.facing[i] };
         }
     }
+}
+
+/// Where the first ray enters a box before its `distance`; infinite where none does.
+#[inline(always)]
+fn entry(aabb: &Aabb, origin: Vec3A, inverse: &Fan, distance: &[f32; FAN]) -> f32 {
+    let (low, high) = (aabb.min - origin, aabb.max - origin);
+    let mut entries = [f32::INFINITY; FAN];
+    for i in 0..FAN {
+        let (ax, bx) = (low.x * inverse.x[i], high.x * inverse.x[i]);
+        let (ay, by) = (low.y * inverse.y[i], high.y * inverse.y[i]);
+        let (az, bz) = (low.z * inverse.z[i], high.z * inverse.z[i]);
+        let near = larger(larger(smaller(ax, bx), smaller(ay, by)), larger(smaller(az, bz), 0.0));
+        let far = smaller(smaller(larger(ax, bx), larger(ay, by)), smaller(larger(az, bz), distance[i]));
+        entries[i] = if near <= far * BOX_SLACK { near } else { f32::INFINITY };
+    }
+    reduce(entries, smaller)
 }
 
 /// One over each, but never infinite: no box that touches the origin makes NaN of it.
@@ -194,4 +288,68 @@ fn reduce(mut values: [f32; FAN], pick: impl Fn(f32, f32) -> f32) -> f32 {
         half /= 2;
     }
     values[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Squares at all heights and places, some turned.
+    fn clutter() -> Tracer {
+        let triangles = (0..300).map(|i| {
+            let [a, b, c, d] = crate::solve::sequence::point(i, 1);
+            let corner = DVec3::new(a, b, c) * 4.0;
+            let axis = DVec3::new(b - 0.5, c - 0.5, d - 0.5);
+            [corner, corner + axis.any_orthogonal_vector() * d, corner + axis * 0.7]
+        });
+        Tracer::new(triangles.collect())
+    }
+
+    fn directions() -> Vec<DVec3> {
+        let some = (0..256).map(|i| {
+            let [a, b, c, _] = crate::solve::sequence::point(i, 2);
+            (DVec3::new(a, b, c) - 0.5).normalize()
+        });
+        some.chain([DVec3::X, -DVec3::Y, DVec3::Z, DVec3::new(0.0, -0.6, 0.8)].repeat(4)).collect()
+    }
+
+    #[test]
+    fn fans_meet_what_single_rays_meet() {
+        let tracer = clutter();
+        let mut stack = FanStack::default();
+        for origin in [DVec3::splat(2.0), DVec3::new(-1.0, 0.3, 1.7), DVec3::new(0.5, 3.5, 2.0)] {
+            let directions = directions();
+            let fans: Vec<Fan> = directions.chunks_exact(FAN).map(Fan::new).collect();
+            let (mut by_fans, mut singly) = (Vec::new(), Vec::new());
+            let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+            tracer.look(origin, axes, &fans, &mut stack, |hit, _| by_fans.push(*hit));
+            for fan in &fans {
+                singly.extend((0..FAN).filter_map(|ray| tracer.closest_hit(origin, fan.direction(ray))));
+            }
+            assert!(singly.len() > 20);
+            assert_eq!(by_fans.len(), singly.len());
+            for (a, b) in by_fans.iter().zip(&singly) {
+                assert_eq!((a.triangle, a.from_behind), (b.triangle, b.from_behind));
+                assert!((a.distance - b.distance).abs() < 1e-4 * b.distance, "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn fans_of_shadow_rays_agree_with_single_ones() {
+        let tracer = clutter();
+        let mut stack = FanStack::default();
+        let from = DVec3::splat(1.5);
+        let to: Vec<DVec3> = directions().iter().map(|d| from + 1.2 * d).collect();
+        let mut occluded = 0;
+        for to in to.chunks(FAN - 3) {
+            let all = tracer.occluded_all(from, to, &mut stack);
+            for (ray, to) in to.iter().enumerate() {
+                assert_eq!(all[ray], tracer.occluded(from, *to));
+                occluded += usize::from(all[ray]);
+            }
+            assert!(all[to.len()..].iter().all(|hit| !hit));
+        }
+        assert!(occluded > 20);
+    }
 }

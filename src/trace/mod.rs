@@ -1,4 +1,5 @@
-//! Ray tracing and spatial look-ups. The only module that knows obvhs.
+//! Ray tracing and spatial look-ups. The only module that knows obvhs, and pulp, which
+//! compiles the rays' inner loops for each kind of processor.
 //!
 //! Positions are shifted to the scene's centre in double precision before they are
 //! rounded to `f32`, so that a scene a million metres from the origin is traced as
@@ -57,6 +58,8 @@ pub struct Tracer {
     /// From metres to obvhs's units.
     scale: f64,
     diagonal: f64,
+    /// What the processor can do.
+    arch: pulp::Arch,
 }
 
 /// A triangle prepared for intersection (Möller and Trumbore 1997).
@@ -103,7 +106,8 @@ impl Tracer {
         let ordered = rays.primitive_indices.iter().map(facing).collect();
         let leaves = boxes.primitive_indices.iter().map(facing).collect();
         let double_sided = Vec::new();
-        Self { rays, boxes, ordered, leaves, triangles, double_sided, centre, scale, diagonal }
+        let arch = pulp::Arch::new();
+        Self { rays, boxes, ordered, leaves, triangles, double_sided, centre, scale, diagonal, arch }
     }
 
     /// Marks the triangles whose backs are surfaces like their fronts, in the order given to [`new`](Self::new).
