@@ -30,6 +30,9 @@ const SMALL_BLOCK: usize = 8;
 /// Blocks of so many texels are looked at for smooth penumbrae.
 const SMOOTH_BLOCKS: std::ops::RangeInclusive<usize> = 33..=1024;
 
+/// A block this many times smaller than the one whose shaft it inherited gets a shaft of its own.
+const BLOCKS_A_SHAFT: usize = 3;
+
 /// Blocks of more texels than this are worked on side by side.
 const PARALLEL_BLOCK: usize = 4096;
 
@@ -107,7 +110,7 @@ impl DirectLight<'_> {
         for emitter in self.emitters {
             let work = Shining { light: self, surface, plane_from_texel, cover, emitter };
             let extent = extent(texels);
-            let done = work.shine_on(texels, extent, None);
+            let done = work.shine_on(texels, extent, Inherited { between: None, texels: usize::MAX });
             effort.add(done.effort);
             take_after_neighbours(texels, |t| &mut t.now);
             if !done.samples.is_empty() {
@@ -179,6 +182,15 @@ struct Shining<'a> {
     emitter: &'a Emitter,
 }
 
+/// What a block inherits from a larger one.
+#[derive(Clone, Copy)]
+struct Inherited<'a> {
+    /// What reaches into that one's shaft; `None` where it had none.
+    between: Option<&'a [u32]>,
+    /// Texels in that one.
+    texels: usize,
+}
+
 fn extent(texels: &[LitTexel]) -> (DVec2, DVec2) {
     texels
         .iter()
@@ -186,7 +198,7 @@ fn extent(texels: &[LitTexel]) -> (DVec2, DVec2) {
 }
 
 impl Shining<'_> {
-    fn shine_on(&self, texels: &mut [LitTexel], extent: (DVec2, DVec2), inherited: Option<&[u32]>) -> Done {
+    fn shine_on(&self, texels: &mut [LitTexel], extent: (DVec2, DVec2), inherited: Inherited) -> Done {
         let tracer = self.light.tracer;
         let frame = &self.surface.frame;
         if texels.is_empty() {
@@ -196,7 +208,14 @@ impl Shining<'_> {
         if self.emitter.is_behind(&hull, frame.normal, tracer.margin()) {
             return Done::default();
         }
-        let between = self.emitter.between(&hull, tracer, inherited);
+        // A block that is not much smaller than the one before has about the same shaft.
+        if let Some(between) = inherited.between
+            && texels.len() > SMALL_BLOCK
+            && texels.len() > inherited.texels / BLOCKS_A_SHAFT
+        {
+            return self.halve(texels, extent, Inherited { between: Some(between), ..inherited });
+        }
+        let between = self.emitter.between(&hull, tracer, inherited.between);
         if between.is_empty() {
             return Done::of(self.shine_freely(texels));
         }
@@ -211,6 +230,11 @@ impl Shining<'_> {
         {
             return done;
         }
+        let own = Inherited { between: Some(&between), texels: texels.len() };
+        self.halve(texels, extent, own)
+    }
+
+    fn halve(&self, texels: &mut [LitTexel], extent: (DVec2, DVec2), inherited: Inherited) -> Done {
         let (min, max) = extent;
         let axis = usize::from(max.y - min.y > max.x - min.x);
         let middle = 0.5 * (min[axis] + max[axis]);
@@ -220,11 +244,12 @@ impl Shining<'_> {
         if low.is_empty() || high.is_empty() {
             // All in one place along the longer axis: they cannot be told apart.
             let all = if low.is_empty() { high } else { low };
-            return self.shadow_edge(all, &self.light.occluders.polygons(tracer, &between));
+            let between = inherited.between.unwrap_or_default();
+            return self.shadow_edge(all, &self.light.occluders.polygons(self.light.tracer, between));
         }
         let (low_extent, high_extent) = (self::extent(low), self::extent(high));
-        let work_low = |low| self.shine_on(low, low_extent, Some(&between));
-        let work_high = |high| self.shine_on(high, high_extent, Some(&between));
+        let work_low = |low| self.shine_on(low, low_extent, inherited);
+        let work_high = |high| self.shine_on(high, high_extent, inherited);
         let (done, other) = if parallel {
             rayon::join(|| work_low(low), || work_high(high))
         } else {

@@ -25,11 +25,48 @@ struct Part {
     count: usize,
 }
 
+/// Polygons whose memory is kept when they are dropped: a part is large, and mostly empty.
+#[derive(Default)]
+struct Parts {
+    parts: Vec<Part>,
+    count: usize,
+}
+
+impl Parts {
+    fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &Part> {
+        self.parts[..self.count].iter()
+    }
+
+    /// Where the next part may be put; it counts once it is [kept](Self::keep).
+    fn next(&mut self) -> &mut Part {
+        if self.count == self.parts.len() {
+            self.parts.push(Part::EMPTY);
+        }
+        &mut self.parts[self.count]
+    }
+
+    /// Keeps what was put into the next part, unless that has no area.
+    fn keep(&mut self) {
+        if self.parts[self.count].count >= 3 {
+            self.count += 1;
+        }
+    }
+}
+
 /// Memory that is kept between calls.
 #[derive(Default)]
 pub struct Workspace {
-    parts: Vec<Part>,
-    next: Vec<Part>,
+    parts: Parts,
+    next: Parts,
+    scratch: [Part; 3],
 }
 
 /// The emitter that [`visible_form_factor`] looks at: convex parts in one plane.
@@ -62,34 +99,33 @@ pub fn visible_form_factor<'t>(
         return Some(0.0); // behind the emitter
     }
     let near_side = plane_offset + emitter.margin.min(-0.5 * plane_offset);
-    workspace.parts.clear();
-    let (mut whole, mut above, mut shade) = (Part::EMPTY, Part::EMPTY, Part::EMPTY);
+    let Workspace { parts, next, scratch } = workspace;
+    let [whole, above, shade] = scratch;
+    parts.clear();
     for part in emitter.parts {
         whole.fill(part.iter().map(|&v| v - x))?;
-        whole.cut(receiver.normal, 0.0, &mut above)?;
-        if above.count >= 3 {
-            workspace.parts.push(above);
-        }
+        whole.cut(receiver.normal, 0.0, parts.next())?;
+        parts.keep();
     }
     for occluder in occluders {
-        if workspace.parts.is_empty() {
+        if parts.is_empty() {
             return Some(0.0);
         }
         // What casts a shadow is above the horizon and on this side of the emitter's plane.
         whole.fill(occluder.iter().map(|&v| v - x))?;
-        whole.cut(receiver.normal, 0.0, &mut above)?;
-        above.cut(emitter.normal, near_side, &mut shade)?;
+        whole.cut(receiver.normal, 0.0, above)?;
+        above.cut(emitter.normal, near_side, shade)?;
         if shade.count >= 3 {
-            subtract(&shade, workspace)?;
+            subtract(shade, parts, next, [whole, above])?;
         }
     }
     let seen_from_x = SurfacePoint { position: DVec3::ZERO, normal: receiver.normal };
-    let sum: f64 = workspace.parts.iter().map(|p| signed_point_to_polygon(seen_from_x, p.corners())).sum();
+    let sum: f64 = parts.iter().map(|p| signed_point_to_polygon(seen_from_x, p.corners())).sum();
     Some(sum.clamp(0.0, 1.0))
 }
 
 /// Removes from all parts what lies in the pyramid over `shade` with its tip in the origin.
-fn subtract(shade: &Part, workspace: &mut Workspace) -> Option<()> {
+fn subtract(shade: &Part, parts: &mut Parts, next: &mut Parts, scratch: [&mut Part; 2]) -> Option<()> {
     let inner = shade.corners().iter().sum::<DVec3>();
     if is_flat(shade, inner) {
         return Some(()); // the point lies in the occluder's plane, so it covers no angle
@@ -105,11 +141,12 @@ fn subtract(shade: &Part, workspace: &mut Workspace) -> Option<()> {
         }
     }
     let sides = &sides[..count];
-    workspace.next.clear();
-    let (mut rest, mut inside) = (Part::EMPTY, Part::EMPTY);
-    for part in &workspace.parts {
+    next.clear();
+    let [rest, inside] = scratch;
+    for part in parts.iter() {
         if sides.iter().any(|&s| part.is_outside(s)) {
-            workspace.next.push(*part);
+            next.next().copy_from(part);
+            next.keep();
             continue;
         }
         rest.copy_from(part);
@@ -117,19 +154,16 @@ fn subtract(shade: &Part, workspace: &mut Workspace) -> Option<()> {
             if rest.is_inside(side) {
                 continue;
             }
-            let mut outside = Part::EMPTY;
-            rest.cut(-side, 0.0, &mut outside)?;
-            if outside.count >= 3 {
-                workspace.next.push(outside);
-            }
-            rest.cut(side, 0.0, &mut inside)?;
-            rest.copy_from(&inside);
+            rest.cut(-side, 0.0, next.next())?;
+            next.keep();
+            rest.cut(side, 0.0, inside)?;
+            rest.copy_from(inside);
             if rest.count < 3 {
                 break;
             }
         }
     }
-    std::mem::swap(&mut workspace.parts, &mut workspace.next);
+    std::mem::swap(parts, next);
     Some(())
 }
 
@@ -137,6 +171,12 @@ fn subtract(shade: &Part, workspace: &mut Workspace) -> Option<()> {
 fn is_flat(shade: &Part, inner: DVec3) -> bool {
     let normal = (shade.corners[1] - shade.corners[0]).cross(shade.corners[2] - shade.corners[0]);
     normal.dot(inner).abs() <= 1e-12 * normal.length() * inner.length()
+}
+
+impl Default for Part {
+    fn default() -> Self {
+        Self::EMPTY
+    }
 }
 
 impl Part {
