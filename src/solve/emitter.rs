@@ -96,6 +96,8 @@ impl Effort {
 pub struct Evaluation {
     workspace: Workspace,
     stack: FanStack,
+    /// Where shadow rays end, and what arrives along them.
+    rays: Vec<(DVec3, DVec3)>,
     precision: Precision,
     /// What was done so far.
     pub effort: Effort,
@@ -106,7 +108,25 @@ impl Evaluation {
     #[must_use]
     pub fn new(precision: Precision) -> Self {
         let (workspace, stack) = (Workspace::default(), FanStack::default());
-        Self { workspace, stack, precision, effort: Effort::default() }
+        Self { workspace, stack, rays: Vec::new(), precision, effort: Effort::default() }
+    }
+
+    /// What arrives at `receiver` along those of the rays that nothing stops.
+    fn seen_along_rays(&mut self, receiver: SurfacePoint, tracer: &Tracer) -> DVec3 {
+        let mut seen = DVec3::ZERO;
+        for rays in self.rays.chunks(FAN) {
+            let mut to = [DVec3::ZERO; FAN];
+            to.iter_mut().zip(rays).for_each(|(to, ray)| *to = ray.0);
+            let occluded = tracer.occluded_all(receiver.position, &to[..rays.len()], &mut self.stack);
+            seen += rays
+                .iter()
+                .zip(occluded)
+                .filter(|(_, occluded)| !occluded)
+                .map(|(ray, _)| ray.1)
+                .sum::<DVec3>();
+        }
+        self.effort.rays += self.rays.len() as u64;
+        seen
     }
 }
 
@@ -136,23 +156,6 @@ impl AreaEmitter {
         self.parts.iter().map(|p| signed_point_to_polygon(receiver, p)).sum::<f64>().clamp(0.0, 1.0)
     }
 
-    /// The irradiance that it gives to `receiver`, visibility counted by a few rays; zero where it would give no
-    /// more than `negligible` with nothing between.
-    #[must_use]
-    pub fn irradiance_by_rays(
-        &self,
-        receiver: SurfacePoint,
-        tracer: &Tracer,
-        negligible: f64,
-        e: &mut Evaluation,
-    ) -> DVec3 {
-        let arriving = self.exitance * self.unoccluded(receiver);
-        if arriving.max_element() <= negligible {
-            return DVec3::ZERO;
-        }
-        arriving * self.fraction_by_rays(receiver, tracer, e)
-    }
-
     fn visible(
         &self,
         receiver: SurfacePoint,
@@ -180,45 +183,65 @@ impl AreaEmitter {
 
     /// The kernel-weighted fraction of sample points in sight.
     fn fraction_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, e: &mut Evaluation) -> f64 {
-        let (mut seen, mut all) = (0.0, 0.0);
-        let most = e.precision.rays_a_side;
+        e.rays.clear();
+        self.aim(receiver, tracer.margin(), e.precision.rays_a_side, |to, share| {
+            e.rays.push((to, DVec3::splat(share)))
+        });
+        e.seen_along_rays(receiver, tracer).x
+    }
+
+    /// Gives points all over it, lifted by `margin`, and the share of its light at `receiver` that each stands for;
+    /// none where it cannot shine on `receiver`. As many a side as `most` if it is one polygon.
+    fn aim(&self, receiver: SurfacePoint, margin: f64, most: u32, mut give: impl FnMut(DVec3, f64)) {
         let whole: f64 = self.parts.iter().map(|p| fan_area(p)).sum();
-        for part in &self.parts {
+        let sides = self.parts.iter().map(|part| {
             let share = fan_area(part) / whole;
-            let side = ((f64::from(most) * share.sqrt()).ceil() as u32).clamp(1, most);
-            let area = share / f64::from(side * side);
-            let point = |k: u32| {
-                let u = (f64::from(k % side) + 0.5) / f64::from(side);
-                let v = (f64::from(k / side) + 0.5) / f64::from(side);
-                point_in_fan(part, u, v)
-            };
-            let mut rays = (0..side * side).filter_map(|k| {
-                let q = point(k);
-                let d = q - receiver.position;
-                let square = d.length_squared();
-                let kernel = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0)
-                    / (square * square);
-                (kernel > 0.0).then(|| (q + self.frame.normal * tracer.margin(), kernel * area))
-            });
-            loop {
-                let (mut to, mut weights, mut count) = ([DVec3::ZERO; FAN], [0.0; FAN], 0);
-                for (point, weight) in rays.by_ref().take(FAN) {
-                    (to[count], weights[count]) = (point, weight);
-                    count += 1;
-                }
-                if count == 0 {
-                    break;
-                }
-                let occluded = tracer.occluded_all(receiver.position, &to[..count], &mut e.stack);
-                for (weight, occluded) in weights.iter().zip(occluded) {
-                    all += weight;
-                    seen += if occluded { 0.0 } else { *weight };
-                }
-                e.effort.rays += count as u64;
+            (share, ((f64::from(most) * share.sqrt()).ceil() as u32).clamp(1, most))
+        });
+        let points = || {
+            self.parts.iter().zip(sides.clone()).flat_map(|(part, (share, side))| {
+                (0..side * side).map(move |k| {
+                    let u = (f64::from(k % side) + 0.5) / f64::from(side);
+                    let v = (f64::from(k / side) + 0.5) / f64::from(side);
+                    (point_in_fan(part, u, v), share / f64::from(side * side))
+                })
+            })
+        };
+        let kernel = |q: DVec3| {
+            let d = q - receiver.position;
+            let cosines = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0);
+            cosines / d.length_squared().powi(2)
+        };
+        let all: f64 = points().map(|(q, area)| kernel(q) * area).sum();
+        for (q, area) in points() {
+            let weight = kernel(q) * area;
+            if weight > 0.0 {
+                give(q + self.frame.normal * margin, weight / all);
             }
         }
-        if all > 0.0 { seen / all } else { 0.0 }
     }
+}
+
+/// The irradiance that all `emitters` give to `receiver`, visibility counted by a few rays each; without those that
+/// would give no more than `negligible` with nothing between.
+#[must_use]
+pub fn irradiance_by_rays(
+    emitters: &[AreaEmitter],
+    receiver: SurfacePoint,
+    tracer: &Tracer,
+    negligible: f64,
+    e: &mut Evaluation,
+) -> DVec3 {
+    e.rays.clear();
+    for emitter in emitters {
+        let arriving = emitter.exitance * emitter.unoccluded(receiver);
+        if arriving.max_element() > negligible {
+            emitter.aim(receiver, tracer.margin(), e.precision.rays_a_side, |to, share| {
+                e.rays.push((to, arriving * share))
+            });
+        }
+    }
+    e.seen_along_rays(receiver, tracer)
 }
 
 pub(super) fn fan_area(part: &[DVec3]) -> f64 {

@@ -16,7 +16,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::direct::DirectPass;
-use super::emitter::{AreaEmitter, Evaluation, Precision};
+use super::emitter::{AreaEmitter, Evaluation, Precision, irradiance_by_rays};
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
 use super::hemisphere::{Directions, Level};
@@ -278,9 +278,7 @@ impl Gathering<'_> {
         self.counts.places += 1;
         self.counts.rays += self.level.rays() as u64;
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
-        let hot =
-            hot_spots.iter().map(|s| s.irradiance_by_rays(point, tracer, negligible, &mut self.evaluation));
-        let hot: DVec3 = hot.sum();
+        let hot = irradiance_by_rays(hot_spots, point, tracer, negligible, &mut self.evaluation);
         Gathered { irradiance: sum / rays + hot, distance: rays / nearness }
     }
 }

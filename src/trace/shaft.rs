@@ -21,10 +21,55 @@ struct HalfSpace {
     offset: f64,
 }
 
+/// Planes that are tested together.
+const LANES: usize = 4;
+
+/// The same half-spaces drawn in by the margin, for vector registers; all of space where there are none left.
+#[derive(Clone, Copy, Debug)]
+struct PlaneLanes {
+    x: [f64; LANES],
+    y: [f64; LANES],
+    z: [f64; LANES],
+    offset: [f64; LANES],
+}
+
+impl PlaneLanes {
+    fn new(planes: &[HalfSpace], margin: f64) -> Self {
+        let of = |value: fn(&HalfSpace) -> f64, none: f64| {
+            std::array::from_fn(|i| planes.get(i).map_or(none, value))
+        };
+        let mut offset = of(|p| p.offset, f64::NEG_INFINITY);
+        offset.iter_mut().for_each(|o| *o += margin);
+        Self { x: of(|p| p.normal.x, 0.0), y: of(|p| p.normal.y, 0.0), z: of(|p| p.normal.z, 0.0), offset }
+    }
+}
+
+/// The work of [`Shaft::filter`], for [`pulp`].
+struct Filter<'a> {
+    shaft: &'a Shaft,
+    triangles: &'a [[DVec3; 3]],
+    candidates: &'a [u32],
+    out: &'a mut Vec<u32>,
+}
+
+impl pulp::NullaryFnOnce for Filter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for &t in self.candidates {
+            if self.shaft.touches_inline(&self.triangles[t as usize]) {
+                self.out.push(t);
+            }
+        }
+    }
+}
+
 /// The convex hull of a receiver and a shooter, drawn in by a small margin.
 #[derive(Clone, Debug)]
 pub struct Shaft {
     planes: Vec<HalfSpace>,
+    lanes: Vec<PlaneLanes>,
     bounds: Bounds,
     margin: f64,
 }
@@ -41,7 +86,8 @@ impl Shaft {
         add_caps(shooter, receiver, margin, &mut planes);
         add_sides(receiver, shooter, margin, &mut planes);
         add_sides(shooter, receiver, margin, &mut planes);
-        Self { planes, bounds, margin }
+        let lanes = planes.chunks(LANES).map(|planes| PlaneLanes::new(planes, margin)).collect();
+        Self { planes, lanes, bounds, margin }
     }
 
     /// Whether a box may reach into the shaft: never wrongly `false`.
@@ -57,17 +103,31 @@ impl Shaft {
     /// Whether a triangle reaches into the shaft.
     #[must_use]
     pub fn touches(&self, triangle: &[DVec3; 3]) -> bool {
+        self.touches_inline(triangle)
+    }
+
+    #[inline(always)]
+    fn touches_inline(&self, triangle: &[DVec3; 3]) -> bool {
         // Planes that cut the triangle, as bits; the first 64, which is more than shafts have.
         let mut cutting = 0_u64;
-        for (index, plane) in self.planes.iter().enumerate() {
-            let offset = plane.offset + self.margin;
-            let above = triangle.map(|v| plane.normal.dot(v) > offset);
-            if above == [false; 3] {
+        for (index, planes) in self.lanes.iter().enumerate() {
+            let mut above = [[false; LANES]; 3];
+            for (v, above) in triangle.iter().zip(&mut above) {
+                for i in 0..LANES {
+                    above[i] = planes.x[i] * v.x + planes.y[i] * v.y + planes.z[i] * v.z > planes.offset[i];
+                }
+            }
+            let [a, b, c] = above;
+            let (mut some, mut all) = (0_u64, 0_u64);
+            for i in 0..LANES {
+                some |= u64::from(a[i] | b[i] | c[i]) << i;
+                all |= u64::from(a[i] & b[i] & c[i]) << i;
+            }
+            if some != (1 << LANES) - 1 {
                 return false;
             }
-            if above != [true; 3] && index < 64 {
-                cutting |= 1 << index;
-            }
+            let shift = index * LANES;
+            cutting |= if shift < 64 { (some & !all) << shift } else { 0 };
         }
         cutting.count_ones() < 2 || self.clips_to_something(triangle, cutting)
     }
@@ -112,7 +172,7 @@ impl Shaft {
 
     /// Appends those of `candidates` that reach into the shaft.
     pub fn filter(&self, tracer: &Tracer, candidates: &[u32], out: &mut Vec<u32>) {
-        out.extend(candidates.iter().copied().filter(|&t| self.touches(&tracer.triangles()[t as usize])));
+        tracer.arch.dispatch(Filter { shaft: self, triangles: tracer.triangles(), candidates, out });
     }
 
     /// Appends all of the scene's triangles that reach into the shaft, in ascending order.
