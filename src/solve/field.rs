@@ -1,13 +1,29 @@
 //! What every point of the scene reflects: the light that rays gather.
+//!
+//! Rays ask millions of times, so the trees of all facets lie in one array, and a grid over each side of a surface
+//! says where to start: mostly at the leaf itself.
 
-use glam::{DVec2, DVec3, Vec2, Vec3};
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::hot::HotSpots;
-use super::locate::{Descent, FacetLocator};
-use crate::element::{Element, Facet};
+use super::locate::{Descent, FacetLocator, Node};
+use crate::element::{Element, Facet, NONE, Side};
+use crate::geom::Frame;
 use crate::light::luminance;
+use crate::surface::Surface;
 use crate::trace::{Hit, Tracer};
+
+/// About this many cells stand for each leaf.
+const CELLS_A_LEAF: f64 = 4.0;
+
+/// Set in the number of a leaf, which is that of its patch; the others number nodes.
+const LEAF: u32 = 1 << 31;
+
+/// A cell that several facets share.
+const SHARED: u32 = u32::MAX;
 
 /// Reflected radiosity `ρ E` as the elements have it, as smooth as there, but in hot spots no more than a cap.
 ///
@@ -15,22 +31,39 @@ use crate::trace::{Hit, Tracer};
 /// [emitters](super::hot) instead.
 pub struct RadiosityField<'a> {
     locator: &'a FacetLocator,
-    facets: Vec<FacetField>,
+    /// By surface, front then back.
+    sides: Vec<SideField>,
+    /// By cell of all sides: a node, a leaf or [`SHARED`].
+    starts: Vec<u32>,
+    nodes: Vec<FieldNode>,
+    patches: Vec<FieldPatch>,
+    /// By facet: a node or a leaf.
+    roots: Vec<u32>,
+    /// Of facets' hot leaves: what the cap took, mean.
+    excess: HashMap<(usize, u32), DVec3>,
 }
 
-struct FacetField {
-    descent: Descent,
-    /// The facet's least corner, metres.
+/// One side of a surface.
+struct SideField {
+    /// `y` runs the other way on the back, as in facets.
+    frame: Frame,
+    /// What all coordinates here are relative to: the least corner, metres.
     min: DVec2,
-    /// By element; only leaves are ever asked.
-    patches: Vec<FieldPatch>,
-    /// By element, what the cap took, mean.
-    excess: Vec<Vec3>,
+    cells_per_metre: Vec2,
+    /// None where there is no such side.
+    cells: UVec2,
+    /// Of its cells, among all.
+    first: u32,
+}
+
+struct FieldNode {
+    middle: Vec2,
+    /// By quadrant: left or right, plus two for above.
+    children: [u32; 4],
 }
 
 #[derive(Clone, Copy, Default)]
 struct FieldPatch {
-    /// Least corner, from the facet's.
     min: Vec2,
     per_size: Vec2,
     corners: [Vec3; 4],
@@ -42,13 +75,101 @@ impl<'a> RadiosityField<'a> {
     /// Takes down what `facets` received, their direct light times `direct_scale`; what `hot` spots reflect beyond
     /// their cap is set apart.
     #[must_use]
-    pub fn new(locator: &'a FacetLocator, facets: &[Facet], hot: &HotSpots, direct_scale: DVec3) -> Self {
-        let facets = facets
+    pub fn new(
+        locator: &'a FacetLocator,
+        surfaces: &[Surface],
+        facets: &[Facet],
+        hot: &HotSpots,
+        direct_scale: DVec3,
+    ) -> Self {
+        let mut field = Self {
+            locator,
+            sides: Vec::with_capacity(2 * surfaces.len()),
+            starts: Vec::new(),
+            nodes: Vec::new(),
+            patches: Vec::new(),
+            roots: Vec::with_capacity(facets.len()),
+            excess: HashMap::new(),
+        };
+        let trees: Vec<Tree> = facets
             .par_iter()
             .zip(hot.leaves(facets))
-            .map(|(facet, is_hot)| FacetField::new(facet, &is_hot, direct_scale, hot.cap))
+            .map(|(facet, is_hot)| Tree::new(facet, &surfaces[facet.surface], &is_hot, direct_scale, hot.cap))
             .collect();
-        Self { locator, facets }
+        for (index, tree) in trees.into_iter().enumerate() {
+            field.take(index, tree);
+        }
+        let mut first = 0;
+        for (index, surface) in surfaces.iter().enumerate() {
+            let own: Vec<usize> = (first..facets.len()).take_while(|&f| facets[f].surface == index).collect();
+            first += own.len();
+            for side in [Side::Front, Side::Back] {
+                field.add_side(index, surface, side, &own, facets);
+            }
+        }
+        field
+    }
+
+    fn take(&mut self, facet: usize, tree: Tree) {
+        let (nodes, patches) = (self.nodes.len() as u32, self.patches.len() as u32);
+        let numbered = |number: u32| number + if number & LEAF == 0 { nodes } else { patches };
+        self.roots.push(numbered(tree.root));
+        self.nodes.extend(
+            tree.nodes.into_iter().map(|node| FieldNode { children: node.children.map(numbered), ..node }),
+        );
+        self.patches.extend(tree.patches);
+        self.excess.extend(tree.excess.into_iter().map(|(leaf, excess)| ((facet, leaf), excess)));
+    }
+
+    /// Lays the grid over a side whose `facets` are these among `all`.
+    fn add_side(&mut self, index: usize, surface: &Surface, side: Side, facets: &[usize], all: &[Facet]) {
+        let (frame, min, extent) = plane_of(surface, side);
+        let leaves: usize =
+            facets.iter().filter(|&&f| all[f].side == side).map(|&f| all[f].leaves().count()).sum();
+        let first = self.starts.len() as u32;
+        if leaves == 0 {
+            self.sides.push(SideField { frame, min, cells_per_metre: Vec2::ZERO, cells: UVec2::ZERO, first });
+            return;
+        }
+        let wanted = CELLS_A_LEAF * leaves as f64;
+        let size = (extent.element_product() / wanted).sqrt();
+        let cells = (extent / size).ceil().clamp(DVec2::ONE, DVec2::splat(wanted)).as_uvec2();
+        let size = extent / cells.as_dvec2();
+        for y in 0..cells.y {
+            for x in 0..cells.x {
+                let low = size * UVec2::new(x, y).as_dvec2();
+                let start = self
+                    .only_facet(index, side, (min + low, min + low + size))
+                    .map(|facet| self.start_for(self.roots[facet], low.as_vec2(), size.as_vec2()));
+                self.starts.push(start.unwrap_or(SHARED));
+            }
+        }
+        self.sides.push(SideField { frame, min, cells_per_metre: (1.0 / size).as_vec2(), cells, first });
+    }
+
+    /// The only facet of a side that reaches between these corners, if it is one.
+    fn only_facet(&self, surface: usize, side: Side, (low, high): (DVec2, DVec2)) -> Option<usize> {
+        match side {
+            Side::Front => self.locator.only_front(surface, low, high),
+            Side::Back => {
+                let (low, high) = (DVec2::new(low.x, -high.y), DVec2::new(high.x, -low.y));
+                self.locator.only_front(surface, low, high).map(|front| front + 1)
+            }
+        }
+    }
+
+    /// The last node that holds all of a cell.
+    fn start_for(&self, root: u32, low: Vec2, size: Vec2) -> u32 {
+        let corners = [low, low + Vec2::new(size.x, 0.0), low + Vec2::new(0.0, size.y), low + size];
+        let mut at = root;
+        while at & LEAF == 0 {
+            let [next, others @ ..] = corners.map(|p| self.nodes[at as usize].child(p));
+            if others != [next; 3] {
+                break;
+            }
+            at = next;
+        }
+        at
     }
 
     /// Mean radiosity of an element that was set apart.
@@ -56,7 +177,7 @@ impl<'a> RadiosityField<'a> {
     pub fn mean_excess(&self, index: usize, facet: &Facet, element: u32) -> DVec3 {
         let leaves = facet.leaves_of(element);
         let area = |leaf: u32| facet.elements[leaf as usize].area;
-        let excess = |leaf: u32| self.facets[index].excess[leaf as usize].as_dvec3();
+        let excess = |leaf: u32| self.excess.get(&(index, leaf)).copied().unwrap_or_default();
         let sum: DVec3 = leaves.iter().map(|&l| area(l) * excess(l)).sum();
         (sum / leaves.iter().map(|&l| area(l)).sum::<f64>()).max(DVec3::ZERO)
     }
@@ -65,18 +186,72 @@ impl<'a> RadiosityField<'a> {
     #[inline]
     #[must_use]
     pub fn radiosity(&self, tracer: &Tracer, hit: &Hit, point: DVec3) -> Vec3 {
-        match self.locator.find(tracer, hit, point) {
-            Some((facet, p)) => self.facets[facet].radiosity(p),
-            None => Vec3::ZERO,
+        let surface = self.locator.surface_of(hit.triangle) as usize;
+        let Some(side) = self.sides.get(2 * surface + usize::from(hit.from_behind)) else {
+            return Vec3::ZERO;
+        };
+        if side.cells.x == 0 {
+            return Vec3::ZERO;
+        }
+        let p = (side.frame.project(point) - side.min).as_vec2();
+        let cell = (p * side.cells_per_metre).max(Vec2::ZERO).as_uvec2().min(side.cells - 1);
+        let mut at = self.starts[(side.first + cell.y * side.cells.x + cell.x) as usize];
+        if at == SHARED {
+            match self.locator.find(tracer, hit, point) {
+                Some((facet, _)) => at = self.roots[facet],
+                None => return Vec3::ZERO,
+            }
+        }
+        while at & LEAF == 0 {
+            at = self.nodes[at as usize].child(p);
+        }
+        self.patches[(at & !LEAF) as usize].at(p)
+    }
+}
+
+/// A side's frame, its least corner there, and its extent.
+fn plane_of(surface: &Surface, side: Side) -> (Frame, DVec2, DVec2) {
+    let (min, max) = surface.extent();
+    let extent = (max - min).max(DVec2::splat(f64::MIN_POSITIVE));
+    match side {
+        Side::Front => (surface.frame, min, extent),
+        Side::Back => {
+            let frame = Frame { v: -surface.frame.v, normal: -surface.frame.normal, ..surface.frame };
+            (frame, DVec2::new(min.x, -max.y), extent)
         }
     }
 }
 
-impl FacetField {
-    fn new(facet: &Facet, is_hot: &[bool], direct_scale: DVec3, cap: f64) -> Self {
-        let min = facet.elements[0].min;
-        let mut patches = vec![FieldPatch::default(); facet.elements.len()];
-        let mut excess = vec![Vec3::ZERO; facet.elements.len()];
+/// A facet's part of the field, numbered by itself.
+struct Tree {
+    root: u32,
+    nodes: Vec<FieldNode>,
+    patches: Vec<FieldPatch>,
+    /// Of hot leaves.
+    excess: Vec<(u32, DVec3)>,
+}
+
+impl Tree {
+    fn new(facet: &Facet, surface: &Surface, is_hot: &[bool], direct_scale: DVec3, cap: f64) -> Self {
+        let (_, min, _) = plane_of(surface, facet.side);
+        let (mut inner, mut leaves) = (0, 0);
+        let numbers: Vec<u32> = facet
+            .elements
+            .iter()
+            .map(|e| {
+                let count = if e.is_leaf() { &mut leaves } else { &mut inner };
+                *count += 1;
+                *count - 1 + if e.is_leaf() { LEAF } else { 0 }
+            })
+            .collect();
+        let descent = Descent::new(facet);
+        let inner = descent.nodes().iter().filter(|n| n.children != [NONE; 4]);
+        let nodes = inner.map(|n: &Node| FieldNode {
+            middle: (n.middle - min).as_vec2(),
+            children: n.children.map(|c| numbers[c as usize]),
+        });
+        let nodes = nodes.collect();
+        let (mut patches, mut excess) = (Vec::with_capacity(leaves as usize), Vec::new());
         for leaf in facet.leaves() {
             let e = &facet.elements[leaf as usize];
             let radiosity = |p| {
@@ -84,35 +259,42 @@ impl FacetField {
                 e.reflectance * (direct * direct_scale + indirect)
             };
             let (corners, middle) = (e.corners().map(radiosity), radiosity(0.5 * (e.min + e.max)));
-            let leaf = leaf as usize;
-            patches[leaf] = FieldPatch::new(e, min, corners, middle);
-            if is_hot[leaf] {
-                let whole = patches[leaf].mean();
-                patches[leaf] = FieldPatch::new(e, min, corners.map(|c| capped(c, cap)), capped(middle, cap));
-                excess[leaf] = whole - patches[leaf].mean();
-            }
+            let whole = FieldPatch::new(e, min, corners, middle);
+            patches.push(if is_hot[leaf as usize] {
+                let cool = FieldPatch::new(e, min, corners.map(|c| capped(c, cap)), capped(middle, cap));
+                excess.push((leaf, (whole.mean() - cool.mean()).as_dvec3()));
+                cool
+            } else {
+                whole
+            });
         }
-        Self { descent: Descent::new(facet), min, patches, excess }
+        Self { root: numbers[0], nodes, patches, excess }
     }
+}
 
+impl FieldNode {
     #[inline]
-    fn radiosity(&self, p: DVec2) -> Vec3 {
-        let patch = &self.patches[self.descent.leaf(p) as usize];
-        let t = (((p - self.min).as_vec2() - patch.min) * patch.per_size).clamp(Vec2::ZERO, Vec2::ONE);
-        let [a, b, c, d] = patch.corners;
-        let s = 2.0 * t - 1.0;
-        a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y) + patch.bulge * (1.0 - 0.5 * s.length_squared())
+    fn child(&self, p: Vec2) -> u32 {
+        self.children[usize::from(p.x >= self.middle.x) + 2 * usize::from(p.y >= self.middle.y)]
     }
 }
 
 impl FieldPatch {
-    fn new(e: &Element, facet_min: DVec2, corners: [DVec3; 4], middle: DVec3) -> Self {
+    fn new(e: &Element, origin: DVec2, corners: [DVec3; 4], middle: DVec3) -> Self {
         Self {
-            min: (e.min - facet_min).as_vec2(),
+            min: (e.min - origin).as_vec2(),
             per_size: (1.0 / (e.max - e.min)).as_vec2(),
             bulge: (middle - 0.25 * corners.iter().sum::<DVec3>()).as_vec3(),
             corners: corners.map(|c| c.as_vec3()),
         }
+    }
+
+    #[inline]
+    fn at(&self, p: Vec2) -> Vec3 {
+        let t = ((p - self.min) * self.per_size).clamp(Vec2::ZERO, Vec2::ONE);
+        let [a, b, c, d] = self.corners;
+        let s = 2.0 * t - 1.0;
+        a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y) + self.bulge * (1.0 - 0.5 * s.length_squared())
     }
 
     fn mean(&self) -> Vec3 {

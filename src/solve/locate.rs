@@ -1,6 +1,6 @@
 //! From what a ray met to the facet there, and to the element of its tree.
 
-use glam::{DVec2, DVec3, UVec2, Vec2};
+use glam::{DVec2, DVec3};
 
 use crate::element::{Facet, NONE, Side};
 use crate::geom::Ring;
@@ -13,9 +13,6 @@ const LEAST_SHARE: f64 = 1e-9;
 
 /// About this many cells stand for each facet of a surface.
 const CELLS_A_FACET: f64 = 16.0;
-
-/// About this many cells stand for each leaf of a facet.
-const CELLS_A_LEAF: f64 = 4.0;
 
 /// Finds facets.
 pub struct FacetLocator {
@@ -57,6 +54,28 @@ impl FacetLocator {
             places.push(Places::new(surface, &fronts, facets, &mut rings));
         }
         Self { surface_of, surfaces: places, rings }
+    }
+
+    /// The surface of one of the scene's triangles, or [`NONE`].
+    #[inline]
+    #[must_use]
+    pub fn surface_of(&self, triangle: usize) -> u32 {
+        self.surface_of[triangle]
+    }
+
+    /// The one front facet of a surface that can be met between these corners; `None` where there are several.
+    #[must_use]
+    pub fn only_front(&self, surface: usize, low: DVec2, high: DVec2) -> Option<usize> {
+        let places = &self.surfaces[surface];
+        let (low, high) = (places.cell(low), places.cell(high));
+        let mut cells = (low.1..=high.1).flat_map(|y| (low.0..=high.0).map(move |x| (x, y)));
+        let only = |cell| match places.facets_in(cell) {
+            [] => places.facets.first().copied(),
+            [only] => Some(*only),
+            _ => None,
+        };
+        let first = only(cells.next()?)?;
+        cells.all(|cell| only(cell) == Some(first)).then_some(first as usize)
     }
 
     /// The facet that a ray met at `point`, and the place in the facet's plane; `None` for the back of a
@@ -117,15 +136,21 @@ impl Places {
         Self { frame: surface.frame, min, cells_per_metre: cells / extent, columns, rows, starts, facets }
     }
 
-    fn facet_at(&self, p: DVec2, rings: &[Vec<Ring>]) -> Option<usize> {
+    fn cell(&self, p: DVec2) -> (usize, usize) {
         let cell = ((p - self.min) * self.cells_per_metre).max(DVec2::ZERO);
-        let (x, y) = ((cell.x as usize).min(self.columns - 1), (cell.y as usize).min(self.rows - 1));
+        ((cell.x as usize).min(self.columns - 1), (cell.y as usize).min(self.rows - 1))
+    }
+
+    fn facets_in(&self, (x, y): (usize, usize)) -> &[u32] {
         let index = y * self.columns + x;
-        let here = &self.facets[self.starts[index] as usize..self.starts[index + 1] as usize];
-        match here {
+        &self.facets[self.starts[index] as usize..self.starts[index + 1] as usize]
+    }
+
+    fn facet_at(&self, p: DVec2, rings: &[Vec<Ring>]) -> Option<usize> {
+        match self.facets_in(self.cell(p)) {
             [] => self.facets.first().map(|&f| f as usize),
             [only] => Some(*only as usize),
-            [first, ..] => {
+            here @ [first, ..] => {
                 let found = here.iter().find(|&&f| contains(&rings[f as usize], p));
                 Some(*found.unwrap_or(first) as usize)
             }
@@ -135,33 +160,22 @@ impl Places {
 
 /// A facet's tree, made for going down it fast.
 pub struct Descent {
-    /// What nodes are relative to: the facet's least corner, metres.
-    min: DVec2,
     nodes: Vec<Node>,
-    /// A grid over the facet: by cell the last node that holds all of it.
-    starts: Vec<u32>,
-    cells: UVec2,
-    cells_per_metre: Vec2,
 }
 
-struct Node {
-    middle: Vec2,
+/// A node of the tree.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// Where its quadrants meet, plane coordinates.
+    pub middle: DVec2,
     /// By quadrant: left or right, plus two for above; all [`NONE`] for a leaf.
-    children: [u32; 4],
-}
-
-impl Node {
-    #[inline]
-    fn child(&self, p: Vec2) -> u32 {
-        self.children[usize::from(p.x >= self.middle.x) + 2 * usize::from(p.y >= self.middle.y)]
-    }
+    pub children: [u32; 4],
 }
 
 impl Descent {
     /// Prepares the facet's tree; nodes are numbered as its elements.
     #[must_use]
     pub fn new(facet: &Facet) -> Self {
-        let root = &facet.elements[0];
         let nodes = facet.elements.iter().map(|e| {
             let (middle, quarter) = (0.5 * (e.min + e.max), 0.25 * (e.max - e.min));
             let children = std::array::from_fn(|quadrant| {
@@ -176,62 +190,32 @@ impl Descent {
                 };
                 e.children().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(NONE)
             });
-            Node { middle: (middle - root.min).as_vec2(), children }
+            Node { middle, children }
         });
-        let nodes: Vec<Node> = nodes.collect();
-        let extent = root.max - root.min;
-        let leaves = facet.leaves().count() as f64;
-        let cells = (extent * (CELLS_A_LEAF * leaves / extent.element_product()).sqrt())
-            .ceil()
-            .clamp(DVec2::ONE, DVec2::splat(CELLS_A_LEAF * leaves));
-        let size = (extent / cells).as_vec2();
-        let cells = cells.as_uvec2();
-        let start = |x: u32, y: u32| {
-            let low = size * UVec2::new(x, y).as_vec2();
-            let (left, above) = (Vec2::new(size.x, 0.0), Vec2::new(0.0, size.y));
-            let mut at = 0;
-            loop {
-                let [next, others @ ..] =
-                    [low, low + left, low + above, low + size].map(|p| nodes[at as usize].child(p));
-                if next == NONE || others != [next; 3] {
-                    return at;
-                }
-                at = next;
-            }
-        };
-        let starts =
-            (0..cells.y).flat_map(|y| (0..cells.x).map(move |x| (x, y))).map(|(x, y)| start(x, y)).collect();
-        Self { min: root.min, starts, cells, cells_per_metre: 1.0 / size, nodes }
+        Self { nodes: nodes.collect() }
     }
 
-    /// The leaf at `p`, plane coordinates.
-    #[inline]
+    /// The nodes, numbered as the facet's elements.
     #[must_use]
-    pub fn leaf(&self, p: DVec2) -> u32 {
-        let p = (p - self.min).as_vec2();
-        let cell = (p * self.cells_per_metre).max(Vec2::ZERO);
-        let (x, y) = ((cell.x as u32).min(self.cells.x - 1), (cell.y as u32).min(self.cells.y - 1));
-        let mut at = self.starts[(y * self.cells.x + x) as usize];
-        loop {
-            let child = self.nodes[at as usize].child(p);
-            if child == NONE {
-                return at;
-            }
-            at = child;
-        }
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
     /// The first element on the way down to `p` for which `is_goal` holds, or the leaf there.
     #[must_use]
     pub fn find(&self, p: DVec2, is_goal: impl Fn(u32) -> bool) -> u32 {
-        let p = (p - self.min).as_vec2();
         let mut at = 0;
         loop {
-            let child = self.nodes[at as usize].child(p);
+            let node = &self.nodes[at as usize];
+            let child = node.children[quadrant(p, node.middle)];
             if child == NONE || is_goal(at) {
                 return at;
             }
             at = child;
         }
     }
+}
+
+fn quadrant(p: DVec2, middle: DVec2) -> usize {
+    usize::from(p.x >= middle.x) + 2 * usize::from(p.y >= middle.y)
 }

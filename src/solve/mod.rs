@@ -129,7 +129,7 @@ pub fn solve(
     let gathering = if patches.shots == 0 {
         GatherCounts::default()
     } else {
-        gather_reflected(&pass, &patches, &locator, &after, &mut facets, progress)?
+        gather_reflected(&pass, &patches, (&locator, problem.surfaces), &after, &mut facets, progress)?
     };
     let emitters: Vec<Emitter> = glowing.into_iter().chain(lights).collect();
     Some(Solution {
@@ -150,7 +150,7 @@ pub fn solve(
 fn gather_reflected(
     pass: &DirectPass,
     patches: &Patches,
-    locator: &FacetLocator,
+    (locator, surfaces): (&FacetLocator, &[Surface]),
     received: &[DVec3],
     facets: &mut [Facet],
     progress: &mut dyn FnMut(f64) -> bool,
@@ -161,7 +161,7 @@ fn gather_reflected(
     let receivers = patches.receivers(facets, gather::LEAST_REFERENCE * pass.typical, &hot);
     let mut counts = GatherCounts::default();
     for round in Round::both(pass.options.gather_error) {
-        let field = RadiosityField::new(locator, facets, &hot, direct_scale);
+        let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
         let hot_spots = hot.emitters(&field, facets);
         let source = Source { field: &field, hot_spots: &hot_spots };
         counts.add(&gather(pass, source, &receivers, round, facets));
