@@ -123,6 +123,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     })
     .ok_or(Error::Cancelled)?;
 
+    let options = &BakeOptions { gather_error: Some(solution.gather_error), ..options.clone() };
+
     enter(&mut recorder, Stage::Retriangulate)?;
     let (mesh, dropped) = radiosity_mesh(&surfaces, &solution.facets);
     account::warn_of_dropped(dropped, &mut recorder);

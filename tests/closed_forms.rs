@@ -146,7 +146,7 @@ fn keldysh_cube() {
     let walls = flipped(&cuboid(DVec3::splat(-5.0), DVec3::splat(5.0)));
     for (gather_error, local, in_the_mean) in KELDYSH {
         let mut options = sized(128);
-        options.gather_error = gather_error;
+        options.gather_error = Some(gather_error);
         let baked =
             Model::new().add(&paint(2.0 / 3.0), &walls).light("point", 50_000.0, DVec3::ZERO).bake(&options);
         for (x, y, expected) in TABLE {

@@ -34,19 +34,70 @@ pub struct Round {
     pub noise: f64,
     /// The error in an element's middle that calls for a split, likewise.
     pub tolerance: f64,
-    /// Whether its light is what the lightmap holds.
-    pub is_last: bool,
 }
 
 impl Round {
-    /// The first, which shows the second how light varies within patches, and the second, whose rays may leave
-    /// this `error`.
+    /// The first shows the last how light varies within patches.
     #[must_use]
-    pub fn both(error: f64) -> [Self; 2] {
-        [
-            Self { noise: 4.0 * error, tolerance: 12.0 * error, is_last: false },
-            Self { noise: error, tolerance: 5.0 * error, is_last: true },
-        ]
+    pub fn first(error: f64) -> Self {
+        Self { noise: 4.0 * error, tolerance: 12.0 * error }
+    }
+
+    /// The last makes the light that the lightmap holds; its rays may leave this `error`.
+    #[must_use]
+    pub fn last(error: f64) -> Self {
+        Self { noise: error, tolerance: 5.0 * error }
+    }
+}
+
+/// The greatest error that is left where nobody says how much may be, as a fraction of the light.
+pub const COARSEST: f64 = 0.007;
+
+/// The least, likewise: an eye sees no less, and lightmaps interpolate no better.
+const FINEST: f64 = 0.0015;
+
+/// An error below the greatest costs no more rays than this, some two seconds of one core,
+const AFFORDABLE_RAYS: f64 = 1.2e7;
+
+/// and this many for each texel, since more texels show more of it.
+const AFFORDABLE_RAYS_A_TEXEL: f64 = 30.0;
+
+/// The number of places grows with this power of the tolerance's inverse.
+const GROWTH: f64 = 0.4;
+
+/// The least error that costs the last round no more than the affordable number of rays for a page of so many
+/// `texels`, told by the `places` of a `round` before.
+#[must_use]
+pub fn affordable_error(places: &Contrasts, round: Round, texels: f64) -> f64 {
+    let affordable = AFFORDABLE_RAYS + AFFORDABLE_RAYS_A_TEXEL * texels;
+    let rays = |last: Round| (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise);
+    let steps = 16;
+    let error = |step: i32| FINEST * (COARSEST / FINEST).powf(f64::from(step) / f64::from(steps));
+    (0..steps).map(error).find(|&e| rays(Round::last(e)) <= affordable).unwrap_or(COARSEST)
+}
+
+/// How many places gathered, by the contrast of what they see.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Contrasts([u64; Self::CLASSES]);
+
+impl Contrasts {
+    const CLASSES: usize = 32;
+
+    /// Classes for each doubling.
+    const FINENESS: f64 = 2.0;
+
+    /// The class of contrast 1.
+    const ONE: f64 = 16.0;
+
+    fn add(&mut self, contrast: f64, places: u64) {
+        let class = (contrast.log2() * Self::FINENESS + Self::ONE).round();
+        self.0[(class.max(0.0) as usize).min(Self::CLASSES - 1)] += places;
+    }
+
+    /// The rays that bring the error of all places down to `noise`.
+    fn rays(&self, noise: f64) -> f64 {
+        let contrast = |class: usize| ((class as f64 - Self::ONE) / Self::FINENESS).exp2();
+        self.0.iter().enumerate().map(|(c, &n)| n as f64 * level_for(contrast(c), noise).rays() as f64).sum()
     }
 }
 
@@ -79,6 +130,8 @@ pub struct GatherCounts {
     pub splits: u64,
     /// Rays.
     pub rays: u64,
+    /// Places by contrast.
+    pub contrasts: Contrasts,
 }
 
 impl GatherCounts {
@@ -87,6 +140,7 @@ impl GatherCounts {
         self.places += other.places;
         self.splits += other.splits;
         self.rays += other.rays;
+        self.contrasts.0.iter_mut().zip(other.contrasts.0).for_each(|(sum, n)| *sum += n);
     }
 }
 
@@ -128,7 +182,9 @@ pub fn gather(
             };
             for receiver in receivers {
                 gathering.level = level_for(receiver.contrast, round.noise);
+                let before = gathering.counts.places;
                 gathering.receive(receiver.element);
+                gathering.counts.contrasts.add(receiver.contrast, gathering.counts.places - before);
             }
             gathering.counts.rays += gathering.evaluation.effort.rays;
             gathering.counts
@@ -286,5 +342,5 @@ impl Gathering<'_> {
 /// How many rays bring the error down to `noise` where single ones deviate by `contrast`: strata of the hemisphere
 /// make it fall with the power of 3/4.
 fn level_for(contrast: f64, noise: f64) -> Level {
-    Level::of((contrast / noise).powf(4.0 / 3.0)).max(Level::LEAST)
+    Level::of((contrast / noise).powf(4.0 / 3.0))
 }

@@ -31,7 +31,7 @@ use crate::trace::Tracer;
 use direct::{DirectPass, ShotCounts};
 use emitter::{AreaEmitter, Emitter};
 use field::RadiosityField;
-use gather::{GatherCounts, Round, Source, gather};
+use gather::{COARSEST, GatherCounts, Round, Source, affordable_error, gather};
 use hot::HotSpots;
 use locate::FacetLocator;
 use patches::{Energy, Patches};
@@ -77,6 +77,8 @@ pub struct Solution {
     pub direct: ShotCounts,
     /// What gathering reflected light did.
     pub gathering: GatherCounts,
+    /// The error that its rays were to leave, as a fraction of the light.
+    pub gather_error: f64,
 }
 
 /// Solves for the light on `facets`.
@@ -126,8 +128,8 @@ pub fn solve(
     shoot_patches(&mut patches, problem, progress)?;
     tracing::debug!(shots = patches.shots, rays = patches.rays(), patches = patches.patches.len(), "patches");
     pass.typical = patches.mean_irradiance();
-    let gathering = if patches.shots == 0 {
-        GatherCounts::default()
+    let (gathering, gather_error) = if patches.shots == 0 {
+        (GatherCounts::default(), problem.options.gather_error.unwrap_or(COARSEST))
     } else {
         gather_reflected(&pass, &patches, (&locator, problem.surfaces), &after, &mut facets, progress)?
     };
@@ -142,11 +144,12 @@ pub fn solve(
         occluders,
         direct,
         gathering,
+        gather_error,
     })
 }
 
 /// Lets all elements gather what the patches reflect in the end; `None` when told to stop. `received` is the
-/// direct light of the patches as the mesh has it.
+/// direct light of the patches as the mesh has it. Returns the error that the rays were to leave, too.
 fn gather_reflected(
     pass: &DirectPass,
     patches: &Patches,
@@ -154,23 +157,46 @@ fn gather_reflected(
     received: &[DVec3],
     facets: &mut [Facet],
     progress: &mut dyn FnMut(f64) -> bool,
-) -> Option<GatherCounts> {
+) -> Option<(GatherCounts, f64)> {
     patches.spread_indirect(facets, pass.tracer.diagonal() * 1e-6);
     let direct_scale = patches.direct_scale(received);
     let hot = HotSpots::find(patches, facets);
     let receivers = patches.receivers(facets, gather::LEAST_REFERENCE * pass.typical, &hot);
     let mut counts = GatherCounts::default();
-    for round in Round::both(pass.options.gather_error) {
+    let area: f64 = surfaces.iter().map(|s| s.area).sum();
+    let texels = area / pass.indirect_threshold.powi(2);
+    let mut run = |round: Round, done: f64| {
         let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
         let hot_spots = hot.emitters(&field, facets);
         let source = Source { field: &field, hot_spots: &hot_spots };
-        counts.add(&gather(pass, source, &receivers, round, facets));
-        tracing::debug!(?counts, hot_spots = hot_spots.len(), "gathered");
-        if !progress(if round.is_last { 1.0 } else { 0.8 }) {
-            return None;
+        let own = gather(pass, source, &receivers, round, facets);
+        tracing::debug!(
+            ?round,
+            places = own.places,
+            rays = own.rays,
+            hot_spots = hot_spots.len(),
+            "gathered"
+        );
+        counts.add(&own);
+        progress(done).then_some(own)
+    };
+    let error = match pass.options.gather_error {
+        Some(error) => {
+            run(Round::first(error), 0.8)?;
+            error
         }
-    }
-    Some(counts)
+        None => {
+            let mut round = Round::first(COARSEST);
+            let mut error = affordable_error(&run(round, 0.75)?.contrasts, round, texels);
+            if error < 0.5 * COARSEST {
+                round = Round::first(error);
+                error = affordable_error(&run(round, 0.8)?.contrasts, round, texels);
+            }
+            error
+        }
+    };
+    run(Round::last(error), 1.0)?;
+    Some((counts, error))
 }
 
 /// Glowing regions and punctual lights, each the strongest first; ties keep the scene's order.

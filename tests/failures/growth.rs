@@ -24,7 +24,7 @@ fn hall(side: u32) -> Baked {
     model = model.add(&paint(0.5), &cells.flat_map(table).collect::<Vec<_>>());
     let mut options = sized(16);
     options.resolution = Resolution::TexelsPerMetre(12.0);
-    options.gather_error = 0.05;
+    options.gather_error = Some(0.05);
     model.bake(&options)
 }
 
