@@ -107,6 +107,9 @@ pub(super) fn fill_texels(report: &mut Report, atlas: &Atlas, texels: TexelCount
     report.texels.covered = texels.covered;
     report.texels.evaluated = texels.evaluated;
     report.texels.dilated = texels.dilated;
+    report.texels.ways = texels.ways;
+    report.texels.exact = texels.effort.exact;
+    report.texels.by_rays = texels.effort.by_rays;
     report.lightmap.width = atlas.width;
     report.lightmap.height = atlas.height;
     report.lightmap.texels_per_metre = atlas.texels_per_metre;

@@ -14,6 +14,7 @@ use super::cover::{Cover, Covering, neighbours, take_after_neighbours};
 use super::coverage::TexelSite;
 use super::fit::{FitTexel, LightSample, fit};
 use super::penumbra::{SmoothBlock, is_soft};
+use super::ways::TexelWays;
 use crate::geom::Frame;
 use crate::geom::polygon::{Ring, contains, nearest_on_segment, rectangle};
 use crate::light::luminance;
@@ -28,7 +29,7 @@ use crate::unwrap::Chart;
 const SMALL_BLOCK: usize = 8;
 
 /// Blocks of so many texels are looked at for smooth penumbrae.
-const SMOOTH_BLOCKS: std::ops::RangeInclusive<usize> = 33..=1024;
+const SMOOTH_BLOCKS: std::ops::RangeInclusive<usize> = 17..=1024;
 
 /// A block this many times smaller than the one whose shaft it inherited gets a shaft of its own.
 const BLOCKS_A_SHAFT: usize = 3;
@@ -103,14 +104,20 @@ pub(super) struct DirectLight<'a> {
 
 impl DirectLight<'_> {
     /// Adds what all emitters send to `texels` of one surface with its `chart`.
-    pub(super) fn shine(&self, surface: &Surface, chart: &Chart, texels: &mut [LitTexel]) -> Effort {
-        let mut effort = Effort::default();
+    pub(super) fn shine(
+        &self,
+        surface: &Surface,
+        chart: &Chart,
+        texels: &mut [LitTexel],
+    ) -> (TexelWays, Effort) {
+        let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
         let plane_from_texel = chart.texel_from_plane.inverse();
         let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
         for emitter in self.emitters {
             let work = Shining { light: self, surface, plane_from_texel, cover, emitter };
             let extent = extent(texels);
             let done = work.shine_on(texels, extent, Inherited { between: None, texels: usize::MAX });
+            ways.add(&done.ways);
             effort.add(done.effort);
             take_after_neighbours(texels, |t| &mut t.now);
             if !done.samples.is_empty() {
@@ -121,7 +128,7 @@ impl DirectLight<'_> {
                 texel.is_at_edge = false;
             }
         }
-        effort
+        (ways, effort)
     }
 }
 
@@ -151,16 +158,14 @@ fn fit_edges(texels: &mut [LitTexel], mut samples: Vec<LightSample>) {
 /// What came of a block.
 #[derive(Default)]
 struct Done {
+    ways: TexelWays,
     effort: Effort,
     samples: Vec<LightSample>,
 }
 
 impl Done {
-    fn of(effort: Effort) -> Self {
-        Self { effort, samples: Vec::new() }
-    }
-
     fn and(mut self, other: Self) -> Self {
+        self.ways.add(&other.ways);
         self.effort.add(other.effort);
         self.samples.extend(other.samples);
         self
@@ -205,8 +210,9 @@ impl Shining<'_> {
             return Done::default();
         }
         let hull = self.block(extent);
+        let count = texels.len() as u64;
         if self.emitter.is_behind(&hull, frame.normal, tracer.margin()) {
-            return Done::default();
+            return Done { ways: TexelWays { behind: count, ..TexelWays::default() }, ..Done::default() };
         }
         // A block that is not much smaller than the one before has about the same shaft.
         if let Some(between) = inherited.between
@@ -217,10 +223,11 @@ impl Shining<'_> {
         }
         let between = self.emitter.between(&hull, tracer, inherited.between);
         if between.is_empty() {
-            return Done::of(self.shine_freely(texels));
+            let ways = TexelWays { lit: count, ..TexelWays::default() };
+            return Done { ways, effort: self.shine_freely(texels), samples: Vec::new() };
         }
         if self.light.occluders.one_hides(&hull, self.emitter, tracer, &between) {
-            return Done::default();
+            return Done { ways: TexelWays { umbra: count, ..TexelWays::default() }, ..Done::default() };
         }
         if texels.len() <= SMALL_BLOCK {
             return self.shadow_edge(texels, &self.light.occluders.polygons(tracer, &between));
@@ -293,7 +300,8 @@ impl Shining<'_> {
         let light = |p| self.irradiance(p, Between::Polygons(&occluders), &mut evaluation);
         let block = SmoothBlock::fit(extent, self.light.typical, light)?;
         texels.iter_mut().for_each(|t| t.now = block.at(t.point));
-        Some(Done::of(evaluation.effort))
+        let ways = TexelWays { smooth: texels.len() as u64, ..TexelWays::default() };
+        Some(Done { ways, effort: evaluation.effort, samples: Vec::new() })
     }
 
     /// A small block in which shadow may fall: one point a texel where the light changes little from texel
@@ -319,7 +327,9 @@ impl Shining<'_> {
                 }
             }
         }
-        Done { effort: evaluation.effort, samples }
+        let edge = texels.iter().filter(|t| t.is_at_edge).count() as u64;
+        let ways = TexelWays { edge, crossed: texels.len() as u64 - edge, ..TexelWays::default() };
+        Done { ways, effort: evaluation.effort, samples }
     }
 
     /// Light at points of the texel's square that lie in its region.

@@ -12,6 +12,7 @@ mod direct;
 mod fit;
 mod locate;
 mod penumbra;
+mod ways;
 
 use std::f64::consts::PI;
 
@@ -32,6 +33,7 @@ pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
 use direct::{DirectLight, LitTexel, texel_steps};
 use locate::TriangleLocator;
+pub use ways::TexelWays;
 
 /// A finished lightmap page.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +77,8 @@ pub struct TexelCounts {
     pub evaluated: u64,
     /// Texels filled from their neighbours.
     pub dilated: u64,
+    /// How they came by it, emitters times texels.
+    pub ways: TexelWays,
     /// Evaluations of direct light and rays, emitters times points.
     pub effort: Effort,
 }
@@ -89,7 +93,7 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
     for (index, site) in sites.iter().enumerate() {
         of_surface[site.surface as usize].push(index);
     }
-    let lit: Vec<(Vec<LitTexel>, Effort)> = of_surface
+    let lit: Vec<(Vec<LitTexel>, TexelWays, Effort)> = of_surface
         .par_iter()
         .enumerate()
         .map(|(surface, indices)| surface_texels(input, surface, indices, &sites))
@@ -98,10 +102,11 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
     let count = size.0 as usize * size.1 as usize;
     let (mut texels, mut valid) = (vec![[0.0; 3]; count], vec![false; count]);
     let mut counts = TexelCounts { covered: sites.len() as u64, ..TexelCounts::default() };
-    for (lit, effort) in &lit {
+    for (lit, ways, effort) in &lit {
         if input.options.direct == Direct::Texel {
             counts.evaluated += lit.len() as u64;
         }
+        counts.ways.add(ways);
         counts.effort.add(*effort);
         for texel in lit {
             let site = &sites[texel.site];
@@ -158,13 +163,13 @@ fn surface_texels(
     surface: usize,
     indices: &[usize],
     sites: &[TexelSite],
-) -> (Vec<LitTexel>, Effort) {
+) -> (Vec<LitTexel>, TexelWays, Effort) {
     let mut texels: Vec<LitTexel> =
         indices.iter().map(|&index| LitTexel::new(index, &sites[index])).collect();
     let step = texel_steps(&input.atlas.charts[surface]);
     let cover = Cover { tracer: input.tracer, surface: &input.surfaces[surface], step };
     cover.uncover(&mut texels);
-    let mut effort = Effort::default();
+    let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
     if input.options.direct == Direct::Texel {
         let light = DirectLight {
             tracer: input.tracer,
@@ -172,7 +177,7 @@ fn surface_texels(
             emitters: input.emitters,
             typical: input.typical,
         };
-        effort = light.shine(&input.surfaces[surface], &input.atlas.charts[surface], &mut texels);
+        (ways, effort) = light.shine(&input.surfaces[surface], &input.atlas.charts[surface], &mut texels);
     }
     let locator = TriangleLocator::new(&input.mesh.surfaces[surface]);
     for texel in &mut texels {
@@ -193,5 +198,5 @@ fn surface_texels(
             }
         };
     }
-    (texels, effort)
+    (texels, ways, effort)
 }

@@ -16,6 +16,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::options::BakeOptions;
+use crate::raster::TexelWays;
 
 /// Everything that a bake reports.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -114,6 +115,12 @@ pub struct TexelReport {
     pub evaluated: u64,
     /// Texels beside a chart that were filled from their neighbours.
     pub dilated: u64,
+    /// Which way the evaluated ones took, once for each emitter.
+    pub ways: TexelWays,
+    /// Evaluations of emitters by cutting what hides them away, exactly.
+    pub exact: u64,
+    /// Evaluations of emitters by shadow rays.
+    pub by_rays: u64,
 }
 
 /// The page.

@@ -110,6 +110,7 @@ impl Shaft {
     fn touches_inline(&self, triangle: &[DVec3; 3]) -> bool {
         // Planes that cut the triangle, as bits; the first 64, which is more than shafts have.
         let mut cutting = 0_u64;
+        let mut is_inside = [true; 3];
         for (index, planes) in self.lanes.iter().enumerate() {
             let mut above = [[false; LANES]; 3];
             for (v, above) in triangle.iter().zip(&mut above) {
@@ -118,6 +119,7 @@ impl Shaft {
                 }
             }
             let [a, b, c] = above;
+            is_inside.iter_mut().zip(above).for_each(|(inside, above)| *inside &= above == [true; LANES]);
             let (mut some, mut all) = (0_u64, 0_u64);
             for i in 0..LANES {
                 some |= u64::from(a[i] | b[i] | c[i]) << i;
@@ -129,7 +131,7 @@ impl Shaft {
             let shift = index * LANES;
             cutting |= if shift < 64 { (some & !all) << shift } else { 0 };
         }
-        cutting.count_ones() < 2 || self.clips_to_something(triangle, cutting)
+        cutting.count_ones() < 2 || is_inside != [false; 3] || self.clips_to_something(triangle, cutting)
     }
 
     /// Cuts the triangle down by the `cutting` planes; something left means that it reaches in.
