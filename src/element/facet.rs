@@ -97,7 +97,13 @@ impl Facet {
     /// The element's centroid as a receiving point.
     #[must_use]
     pub fn centre(&self, element: u32) -> SurfacePoint {
-        let position = self.frame.lift(self.elements[element as usize].centroid);
+        self.receiving(self.elements[element as usize].centroid)
+    }
+
+    /// A place of the facet as a receiving point.
+    #[must_use]
+    pub fn receiving(&self, p: DVec2) -> SurfacePoint {
+        let position = self.frame.lift(p);
         SurfacePoint { position: position + self.frame.normal * self.lift, normal: self.frame.normal }
     }
 

@@ -17,17 +17,36 @@ use crate::trace::{FAN, FanStack, Tracer};
 pub struct Precision {
     /// Up to this many occluders are subtracted exactly; beyond, rays are counted.
     pub exact_occluders: usize,
-    /// Rays that stand in for the exact visibility, along one side of their grid.
-    pub rays_a_side: u32,
+    /// Rays that stand in for the exact visibility.
+    pub rays: RayGrid,
+}
+
+/// A grid of points on an emitter, to which rays go; each part of one that is no single polygon has its share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayGrid {
+    /// Two a side.
+    Coarse,
+    /// Four a side.
+    Medium,
+    /// Eight a side.
+    Fine,
+}
+
+impl RayGrid {
+    const ALL: [Self; 3] = [Self::Coarse, Self::Medium, Self::Fine];
+
+    fn points_a_side(self) -> u32 {
+        2 << self as u32
+    }
 }
 
 impl Precision {
     /// For emitters: few, strong, and seen in every shadow's edge.
-    pub const EMITTER: Self = Self { exact_occluders: 32, rays_a_side: 8 };
+    pub const EMITTER: Self = Self { exact_occluders: 32, rays: RayGrid::Fine };
     /// For small places that reflect much.
-    pub const HOT_SPOT: Self = Self { exact_occluders: 0, rays_a_side: 2 };
+    pub const HOT_SPOT: Self = Self { exact_occluders: 0, rays: RayGrid::Coarse };
     /// For emitters seen from several points of one texel.
-    pub const TEXEL: Self = Self { exact_occluders: 32, rays_a_side: 4 };
+    pub const TEXEL: Self = Self { exact_occluders: 32, rays: RayGrid::Medium };
 }
 
 /// A glowing planar polygon of uniform radiance, one side of it.
@@ -41,6 +60,8 @@ pub struct AreaEmitter {
     exitance: DVec3,
     /// Square metres.
     area: f64,
+    /// By grid: points and the share of the area that each stands for.
+    grids: [Vec<(DVec3, f64)>; 3],
 }
 
 /// Something that light comes from.
@@ -138,7 +159,8 @@ impl AreaEmitter {
     pub fn new(frame: Frame, parts: Vec<Vec<DVec3>>, area: f64, exitance: DVec3) -> Self {
         let corners = parts.iter().flatten().map(|&p| frame.project(p)).collect();
         let hull = convex_hull(corners).into_iter().map(|p| frame.lift(p)).collect();
-        Self { parts, hull, frame, exitance, area }
+        let grids = RayGrid::ALL.map(|grid| grid_points(&parts, grid));
+        Self { parts, hull, frame, exitance, area, grids }
     }
 
     /// The power that leaves it.
@@ -184,42 +206,48 @@ impl AreaEmitter {
     /// The kernel-weighted fraction of sample points in sight.
     fn fraction_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, e: &mut Evaluation) -> f64 {
         e.rays.clear();
-        self.aim(receiver, tracer.margin(), e.precision.rays_a_side, |to, share| {
+        self.aim(receiver, tracer.margin(), e.precision.rays, |to, share| {
             e.rays.push((to, DVec3::splat(share)))
         });
         e.seen_along_rays(receiver, tracer).x
     }
 
     /// Gives points all over it, lifted by `margin`, and the share of its light at `receiver` that each stands for;
-    /// none where it cannot shine on `receiver`. As many a side as `most` if it is one polygon.
-    fn aim(&self, receiver: SurfacePoint, margin: f64, most: u32, mut give: impl FnMut(DVec3, f64)) {
-        let whole: f64 = self.parts.iter().map(|p| fan_area(p)).sum();
-        let sides = self.parts.iter().map(|part| {
-            let share = fan_area(part) / whole;
-            (share, ((f64::from(most) * share.sqrt()).ceil() as u32).clamp(1, most))
-        });
-        let points = || {
-            self.parts.iter().zip(sides.clone()).flat_map(|(part, (share, side))| {
-                (0..side * side).map(move |k| {
-                    let u = (f64::from(k % side) + 0.5) / f64::from(side);
-                    let v = (f64::from(k / side) + 0.5) / f64::from(side);
-                    (point_in_fan(part, u, v), share / f64::from(side * side))
-                })
-            })
-        };
-        let kernel = |q: DVec3| {
+    /// none where it cannot shine on `receiver`.
+    fn aim(&self, receiver: SurfacePoint, margin: f64, grid: RayGrid, mut give: impl FnMut(DVec3, f64)) {
+        let points = &self.grids[grid as usize];
+        let kernel = |&(q, area): &(DVec3, f64)| {
             let d = q - receiver.position;
+            let square = d.length_squared();
             let cosines = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0);
-            cosines / d.length_squared().powi(2)
+            area * cosines / (square * square)
         };
-        let all: f64 = points().map(|(q, area)| kernel(q) * area).sum();
-        for (q, area) in points() {
-            let weight = kernel(q) * area;
+        let all: f64 = points.iter().map(kernel).sum();
+        let lift = self.frame.normal * margin;
+        for point in points {
+            let weight = kernel(point);
             if weight > 0.0 {
-                give(q + self.frame.normal * margin, weight / all);
+                give(point.0 + lift, weight / all);
             }
         }
     }
+}
+
+/// Points all over convex `parts`, and the share of their area that each stands for.
+fn grid_points(parts: &[Vec<DVec3>], grid: RayGrid) -> Vec<(DVec3, f64)> {
+    let whole: f64 = parts.iter().map(|p| fan_area(p)).sum();
+    let most = grid.points_a_side();
+    let mut points = Vec::new();
+    for part in parts {
+        let share = fan_area(part) / whole;
+        let side = ((f64::from(most) * share.sqrt()).ceil() as u32).clamp(1, most);
+        points.extend((0..side * side).map(|k| {
+            let u = (f64::from(k % side) + 0.5) / f64::from(side);
+            let v = (f64::from(k / side) + 0.5) / f64::from(side);
+            (point_in_fan(part, u, v), share / f64::from(side * side))
+        }));
+    }
+    points
 }
 
 /// The irradiance that all `emitters` give to `receiver`, visibility counted by a few rays each; without those that
@@ -236,7 +264,7 @@ pub fn irradiance_by_rays(
     for emitter in emitters {
         let arriving = emitter.exitance * emitter.unoccluded(receiver);
         if arriving.max_element() > negligible {
-            emitter.aim(receiver, tracer.margin(), e.precision.rays_a_side, |to, share| {
+            emitter.aim(receiver, tracer.margin(), e.precision.rays, |to, share| {
                 e.rays.push((to, arriving * share))
             });
         }

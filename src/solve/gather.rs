@@ -15,13 +15,14 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::contact::Nearby;
 use super::direct::DirectPass;
 use super::emitter::{AreaEmitter, Evaluation, Precision, irradiance_by_rays};
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
 use super::hemisphere::{Directions, Level};
 use super::patches::Receiver;
-use crate::element::{Facet, NONE, Shading};
+use crate::element::{Facet, Shading};
 use crate::geom::Frame;
 use crate::light::luminance;
 use crate::options::Refine;
@@ -60,7 +61,7 @@ const FINEST: f64 = 0.0015;
 const AFFORDABLE_RAYS: f64 = 1.2e7;
 
 /// and this many for each texel, since more texels show more of it.
-const AFFORDABLE_RAYS_A_TEXEL: f64 = 30.0;
+const AFFORDABLE_RAYS_A_TEXEL: f64 = 40.0;
 
 /// The number of places grows with this power of the tolerance's inverse.
 const GROWTH: f64 = 0.4;
@@ -175,6 +176,7 @@ pub fn gather(
                 directions: &directions,
                 level: Level::LEAST,
                 stack: FanStack::default(),
+                nearby: Nearby::default(),
                 evaluation: Evaluation::new(Precision::HOT_SPOT),
                 places: vec![None; facet.samples.len()],
                 facet,
@@ -204,6 +206,7 @@ struct Gathering<'a> {
     /// How many of them a place takes.
     level: Level,
     stack: FanStack,
+    nearby: Nearby,
     /// For hot spots.
     evaluation: Evaluation,
     facet: &'a mut Facet,
@@ -236,29 +239,59 @@ impl Gathering<'_> {
         let values = places.map(|p| p.irradiance);
         let mut shading = self.facet.elements[element as usize].flat(values);
         let nearest = places.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
-        if size > FLAT * self.round.tolerance.sqrt() * nearest && self.may_split(element) {
-            let middle = self.at(self.facet.centre(element));
-            let e = &self.facet.elements[element as usize];
-            let interpolated = shading.at(e.place(e.centroid));
-            let mut error = luminance((interpolated - middle.irradiance).abs());
-            shading = e.shading(values, middle.irradiance);
-            if middle.distance < size {
-                let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
-                error = differences.map(|d| NEAR_SHARE * d).fold(error, f64::max);
+        let (mut middle, mut is_uneven) = (None, false);
+        if self.may_split(element) {
+            if size > FLAT * self.round.tolerance.sqrt() * nearest {
+                let gathered = self.at(self.facet.centre(element));
+                is_uneven = self.is_missed_in_the_middle(element, &shading, values, gathered);
+                shading = self.facet.elements[element as usize].shading(values, gathered.irradiance);
+                middle = Some(gathered);
             }
-            let (direct, _) = self.facet.received(element, e.centroid);
-            let light = luminance(direct + middle.irradiance).max(LEAST_REFERENCE * self.pass.typical);
-            if error > self.round.tolerance * light && self.part(element, values) {
-                self.hand_down(element, middle);
-                for child in self.facet.elements[element as usize].children {
-                    if child != NONE {
-                        self.receive(child);
-                    }
-                }
-                return;
-            }
+            is_uneven = is_uneven || self.is_missed_under_cover(element, &shading);
         }
-        self.facet.elements[element as usize].indirect = shading;
+        if is_uneven && self.part(element, values) {
+            self.places.resize(self.facet.samples.len(), None);
+            if let Some(middle) = middle {
+                self.hand_down(element, middle);
+            }
+            for child in self.facet.elements[element as usize].children() {
+                self.receive(child);
+            }
+        } else {
+            self.facet.elements[element as usize].indirect = shading;
+        }
+    }
+
+    /// Whether the samples' `shading` is not what the middle gathered.
+    fn is_missed_in_the_middle(
+        &self,
+        element: u32,
+        shading: &Shading,
+        values: [DVec3; 4],
+        middle: Gathered,
+    ) -> bool {
+        let e = &self.facet.elements[element as usize];
+        let mut error = luminance((shading.at(e.place(e.centroid)) - middle.irradiance).abs());
+        if middle.distance < e.size() {
+            let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
+            error = differences.map(|d| NEAR_SHARE * d).fold(error, f64::max);
+        }
+        error > self.tolerated(element, e.centroid, middle)
+    }
+
+    /// Whether something stands close over the element where its light is not what `shading` says.
+    fn is_missed_under_cover(&mut self, element: u32, shading: &Shading) -> bool {
+        let Some(p) = self.nearby.most_covered(self.pass.tracer, self.facet, element) else { return false };
+        let gathered = self.at(self.facet.receiving(p));
+        let shading = shading.at(self.facet.elements[element as usize].place(p));
+        luminance((shading - gathered.irradiance).abs()) > self.tolerated(element, p, gathered)
+    }
+
+    /// The error that is tolerated at a place of an element.
+    fn tolerated(&self, element: u32, p: DVec2, gathered: Gathered) -> f64 {
+        let (direct, _) = self.facet.received(element, p);
+        let light = luminance(direct + gathered.irradiance);
+        self.round.tolerance * light.max(LEAST_REFERENCE * self.pass.typical)
     }
 
     fn may_split(&self, element: u32) -> bool {
@@ -299,7 +332,6 @@ impl Gathering<'_> {
 
     /// What the middle gathered serves the parts that meet there.
     fn hand_down(&mut self, element: u32, middle: Gathered) {
-        self.places.resize(self.facet.samples.len(), None);
         let e = &self.facet.elements[element as usize];
         let near = 1e-3 * e.size();
         for child in e.children() {

@@ -6,6 +6,7 @@
 //! most unshot power first, until the unshot power is a small fraction of the emitted; and
 //! what all reflect in the end is gathered by the elements ([`mod@gather`]).
 
+pub mod contact;
 pub mod direct;
 pub mod emitter;
 pub mod exchange;
