@@ -41,6 +41,11 @@ impl Parts {
         self.count == 0
     }
 
+    /// The part, if there is one only.
+    fn only(&self) -> Option<&Part> {
+        if self.count == 1 { self.parts.first() } else { None }
+    }
+
     fn iter(&self) -> impl Iterator<Item = &Part> {
         self.parts[..self.count].iter()
     }
@@ -107,12 +112,19 @@ pub fn visible_form_factor<'t>(
         whole.cut(receiver.normal, 0.0, parts.next())?;
         parts.keep();
     }
+    let around = match parts.only() {
+        Some(part) => Pyramid::over(part),
+        None => Pyramid::EMPTY,
+    };
     for occluder in occluders {
         if parts.is_empty() {
             return Some(0.0);
         }
-        // What casts a shadow is above the horizon and on this side of the emitter's plane.
         whole.fill(occluder.iter().map(|&v| v - x))?;
+        if around.sides().iter().any(|&side| whole.is_outside(side)) {
+            continue;
+        }
+        // What casts a shadow is above the horizon and on this side of the emitter's plane.
         whole.cut(receiver.normal, 0.0, above)?;
         above.cut(emitter.normal, near_side, shade)?;
         if shade.count >= 3 {
@@ -126,21 +138,11 @@ pub fn visible_form_factor<'t>(
 
 /// Removes from all parts what lies in the pyramid over `shade` with its tip in the origin.
 fn subtract(shade: &Part, parts: &mut Parts, next: &mut Parts, scratch: [&mut Part; 2]) -> Option<()> {
-    let inner = shade.corners().iter().sum::<DVec3>();
-    if is_flat(shade, inner) {
+    if is_flat(shade) {
         return Some(()); // the point lies in the occluder's plane, so it covers no angle
     }
-    let mut sides = [DVec3::ZERO; MOST_CORNERS];
-    let mut count = 0;
-    for (i, a) in shade.corners().iter().enumerate() {
-        let side = a.cross(shade.corners[if i + 1 == shade.count { 0 } else { i + 1 }]);
-        // A side seen edge-on, or an edge too short to matter, bounds nothing.
-        if side.length_squared() > 0.0 {
-            sides[count] = if side.dot(inner) >= 0.0 { side } else { -side };
-            count += 1;
-        }
-    }
-    let sides = &sides[..count];
+    let pyramid = Pyramid::over(shade);
+    let sides = pyramid.sides();
     next.clear();
     let [rest, inside] = scratch;
     for part in parts.iter() {
@@ -167,8 +169,38 @@ fn subtract(shade: &Part, parts: &mut Parts, next: &mut Parts, scratch: [&mut Pa
     Some(())
 }
 
+/// The planes through the origin and a polygon's edges, by normals that point inwards.
+struct Pyramid {
+    sides: [DVec3; MOST_CORNERS],
+    count: usize,
+}
+
+impl Pyramid {
+    /// Without sides: all of space.
+    const EMPTY: Self = Self { sides: [DVec3::ZERO; MOST_CORNERS], count: 0 };
+
+    fn over(polygon: &Part) -> Self {
+        let mut pyramid = Self::EMPTY;
+        let inner = polygon.corners().iter().sum::<DVec3>();
+        for (i, a) in polygon.corners().iter().enumerate() {
+            let side = a.cross(polygon.corners[if i + 1 == polygon.count { 0 } else { i + 1 }]);
+            // A side seen edge-on, or an edge too short to matter, bounds nothing.
+            if side.length_squared() > 0.0 {
+                pyramid.sides[pyramid.count] = if side.dot(inner) >= 0.0 { side } else { -side };
+                pyramid.count += 1;
+            }
+        }
+        pyramid
+    }
+
+    fn sides(&self) -> &[DVec3] {
+        &self.sides[..self.count]
+    }
+}
+
 /// Whether the origin lies in the polygon's plane, so that its pyramid has no volume.
-fn is_flat(shade: &Part, inner: DVec3) -> bool {
+fn is_flat(shade: &Part) -> bool {
+    let inner = shade.corners().iter().sum::<DVec3>();
     let normal = (shade.corners[1] - shade.corners[0]).cross(shade.corners[2] - shade.corners[0]);
     normal.dot(inner).abs() <= 1e-12 * normal.length() * inner.length()
 }
