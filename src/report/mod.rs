@@ -219,7 +219,10 @@ mod tests {
             "splits_saved_by_umbra",
         ];
         assert_eq!(keys(&json["cob"]), cob);
-        assert_eq!(keys(&json["texels"]), ["covered", "evaluated", "dilated"]);
+        let texels = ["covered", "evaluated", "dilated", "ways", "exact", "by_rays"];
+        assert_eq!(keys(&json["texels"]), texels);
+        let ways = ["behind", "lit", "umbra", "smooth", "crossed", "edge"];
+        assert_eq!(keys(&json["texels"]["ways"]), ways);
         let lightmap = ["width", "height", "texels_per_metre", "charts", "utilisation", "bytes"];
         assert_eq!(keys(&json["lightmap"]), lightmap);
         assert_eq!(keys(&json["energy"]), ["emitted", "absorbed", "escaped", "unshot"]);

@@ -207,7 +207,7 @@ impl AreaEmitter {
     fn fraction_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, e: &mut Evaluation) -> f64 {
         e.rays.clear();
         self.aim(receiver, tracer.margin(), e.precision.rays, |to, share| {
-            e.rays.push((to, DVec3::splat(share)))
+            e.rays.push((to, DVec3::splat(share)));
         });
         e.seen_along_rays(receiver, tracer).x
     }
@@ -265,7 +265,7 @@ pub fn irradiance_by_rays(
         let arriving = emitter.exitance * emitter.unoccluded(receiver);
         if arriving.max_element() > negligible {
             emitter.aim(receiver, tracer.margin(), e.precision.rays, |to, share| {
-                e.rays.push((to, arriving * share))
+                e.rays.push((to, arriving * share));
             });
         }
     }

@@ -163,7 +163,7 @@ pub fn gather(
     round: Round,
     facets: &mut [Facet],
 ) -> GatherCounts {
-    let directions = Directions::new();
+    let directions = Directions::prepare();
     let counts: Vec<GatherCounts> = facets
         .par_iter_mut()
         .zip(receivers)

@@ -294,13 +294,13 @@ fn reduce(mut values: [f32; FAN], pick: impl Fn(f32, f32) -> f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Squares at all heights and places, some turned.
+    /// Triangles at all places, turned all ways.
     fn clutter() -> Tracer {
         let triangles = (0..300).map(|i| {
             let [a, b, c, d] = crate::solve::sequence::point(i, 1);
             let corner = DVec3::new(a, b, c) * 4.0;
             let axis = DVec3::new(b - 0.5, c - 0.5, d - 0.5);
-            [corner, corner + axis.any_orthogonal_vector() * d, corner + axis * 0.7]
+            [corner, corner + axis.any_orthonormal_vector() * d, corner + axis * 2.0]
         });
         Tracer::new(triangles.collect())
     }

@@ -112,12 +112,13 @@ impl Shaft {
         let mut cutting = 0_u64;
         let mut is_inside = [true; 3];
         for (index, planes) in self.lanes.iter().enumerate() {
-            let mut above = [[false; LANES]; 3];
-            for (v, above) in triangle.iter().zip(&mut above) {
-                for i in 0..LANES {
-                    above[i] = planes.x[i] * v.x + planes.y[i] * v.y + planes.z[i] * v.z > planes.offset[i];
-                }
-            }
+            let is_above = |v: DVec3| {
+                std::array::from_fn(|i| {
+                    planes.x[i] * v.x + planes.y[i] * v.y + planes.z[i] * v.z > planes.offset[i]
+                })
+            };
+            let above: [[bool; LANES]; 3] =
+                [is_above(triangle[0]), is_above(triangle[1]), is_above(triangle[2])];
             let [a, b, c] = above;
             is_inside.iter_mut().zip(above).for_each(|(inside, above)| *inside &= above == [true; LANES]);
             let (mut some, mut all) = (0_u64, 0_u64);
