@@ -49,6 +49,9 @@ impl Precision {
     pub const TEXEL: Self = Self { exact_occluders: 32, rays: RayGrid::Medium };
 }
 
+/// What is this many of its diameters away is far.
+const FAR: f64 = 5.0;
+
 /// A glowing planar polygon of uniform radiance, one side of it.
 #[derive(Clone, Debug)]
 pub struct AreaEmitter {
@@ -60,6 +63,8 @@ pub struct AreaEmitter {
     exitance: DVec3,
     /// Square metres.
     area: f64,
+    /// Square of the hull's diameter, square metres.
+    diameter_squared: f64,
     /// By grid: points and the share of the area that each stands for.
     grids: [Vec<(DVec3, f64)>; 3],
 }
@@ -158,9 +163,11 @@ impl AreaEmitter {
     #[must_use]
     pub fn new(frame: Frame, parts: Vec<Vec<DVec3>>, area: f64, exitance: DVec3) -> Self {
         let corners = parts.iter().flatten().map(|&p| frame.project(p)).collect();
-        let hull = convex_hull(corners).into_iter().map(|p| frame.lift(p)).collect();
+        let hull: Vec<DVec3> = convex_hull(corners).into_iter().map(|p| frame.lift(p)).collect();
         let grids = RayGrid::ALL.map(|grid| grid_points(&parts, grid));
-        Self { parts, hull, frame, exitance, area, grids }
+        let distances = hull.iter().flat_map(|p| hull.iter().map(|q| q.distance_squared(*p)));
+        let diameter_squared = distances.fold(0.0, f64::max);
+        Self { parts, hull, frame, exitance, area, diameter_squared, grids }
     }
 
     /// The power that leaves it.
@@ -205,31 +212,42 @@ impl AreaEmitter {
 
     /// The kernel-weighted fraction of sample points in sight.
     fn fraction_by_rays(&self, receiver: SurfacePoint, tracer: &Tracer, e: &mut Evaluation) -> f64 {
+        let grid = e.precision.rays;
+        let all = self.told_by_points(receiver, grid);
         e.rays.clear();
-        self.aim(receiver, tracer.margin(), e.precision.rays, |to, share| {
-            e.rays.push((to, DVec3::splat(share)));
-        });
+        self.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, DVec3::splat(part / all))));
         e.seen_along_rays(receiver, tracer).x
     }
 
-    /// Gives points all over it, lifted by `margin`, and the share of its light at `receiver` that each stands for;
-    /// none where it cannot shine on `receiver`.
+    /// The form factor from `receiver` with nothing between, as its points tell it.
+    fn told_by_points(&self, receiver: SurfacePoint, grid: RayGrid) -> f64 {
+        self.grids[grid as usize].iter().map(|&(q, share)| share * self.kernel(receiver, q)).sum()
+    }
+
+    /// What the form factor from `receiver` would be if all of it were at `q`.
+    fn kernel(&self, receiver: SurfacePoint, q: DVec3) -> f64 {
+        let d = q - receiver.position;
+        let square = d.length_squared();
+        let cosines = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0);
+        self.area * cosines / (PI * square * square)
+    }
+
+    /// Gives points all over it, lifted by `margin`, and what each is told to be of the form factor at `receiver`,
+    /// but those that cannot shine there.
     fn aim(&self, receiver: SurfacePoint, margin: f64, grid: RayGrid, mut give: impl FnMut(DVec3, f64)) {
-        let points = &self.grids[grid as usize];
-        let kernel = |&(q, area): &(DVec3, f64)| {
-            let d = q - receiver.position;
-            let square = d.length_squared();
-            let cosines = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0);
-            area * cosines / (square * square)
-        };
-        let all: f64 = points.iter().map(kernel).sum();
         let lift = self.frame.normal * margin;
-        for point in points {
-            let weight = kernel(point);
-            if weight > 0.0 {
-                give(point.0 + lift, weight / all);
+        for &(q, share) in &self.grids[grid as usize] {
+            let part = share * self.kernel(receiver, q);
+            if part > 0.0 {
+                give(q + lift, part);
             }
         }
+    }
+
+    /// Whether it is so far away that few points tell its form factor to a hundredth.
+    fn is_far(&self, from: DVec3) -> bool {
+        let nearest = self.hull.iter().map(|q| q.distance_squared(from)).fold(f64::INFINITY, f64::min);
+        nearest > FAR * FAR * self.diameter_squared
     }
 }
 
@@ -262,11 +280,12 @@ pub fn irradiance_by_rays(
 ) -> DVec3 {
     e.rays.clear();
     for emitter in emitters {
-        let arriving = emitter.exitance * emitter.unoccluded(receiver);
-        if arriving.max_element() > negligible {
-            emitter.aim(receiver, tracer.margin(), e.precision.rays, |to, share| {
-                e.rays.push((to, arriving * share));
-            });
+        let grid = e.precision.rays;
+        let told = emitter.told_by_points(receiver, grid);
+        let form_factor = if emitter.is_far(receiver.position) { told } else { emitter.unoccluded(receiver) };
+        if told > 0.0 && emitter.exitance.max_element() * form_factor > negligible {
+            let arriving = emitter.exitance * (form_factor / told);
+            emitter.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, arriving * part)));
         }
     }
     e.seen_along_rays(receiver, tracer)

@@ -60,8 +60,8 @@ const FINEST: f64 = 0.0015;
 /// An error below the greatest costs no more rays than this, some two seconds of one core,
 const AFFORDABLE_RAYS: f64 = 1.2e7;
 
-/// and this many for each texel, since more texels show more of it.
-const AFFORDABLE_RAYS_A_TEXEL: f64 = 40.0;
+/// and this many for each texel, since more texels show more of it, until these have doubled the former.
+const AFFORDABLE_RAYS_A_TEXEL: f64 = 50.0;
 
 /// The number of places grows with this power of the tolerance's inverse.
 const GROWTH: f64 = 0.4;
@@ -70,9 +70,9 @@ const GROWTH: f64 = 0.4;
 /// `texels`, told by the `places` of a `round` before.
 #[must_use]
 pub fn affordable_error(places: &Contrasts, round: Round, texels: f64) -> f64 {
-    let affordable = AFFORDABLE_RAYS + AFFORDABLE_RAYS_A_TEXEL * texels;
+    let affordable = AFFORDABLE_RAYS + (AFFORDABLE_RAYS_A_TEXEL * texels).min(AFFORDABLE_RAYS);
     let rays = |last: Round| (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise);
-    let steps = 16;
+    let steps = 32;
     let error = |step: i32| FINEST * (COARSEST / FINEST).powf(f64::from(step) / f64::from(steps));
     (0..steps).map(error).find(|&e| rays(Round::last(e)) <= affordable).unwrap_or(COARSEST)
 }
