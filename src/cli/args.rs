@@ -116,8 +116,8 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "FRACTION", default_value_t = BakeOptions::default().unshot_fraction, allow_negative_numbers = true, help_heading = SOLVER)]
     unshot_fraction: f64,
 
-    /// The error that rays may leave in reflected light, as a fraction of the light; 0.0001 to 1 [default: 0.0018 to
-    /// 0.007, as the scene affords]
+    /// The error that rays may leave in reflected light, as a fraction of the light; 0.0001 to 1 [default: 0.0015 to
+    /// 0.008, as the scene affords]
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true, help_heading = SOLVER)]
     gather_error: Option<f64>,
 

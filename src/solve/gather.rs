@@ -52,7 +52,7 @@ impl Round {
 }
 
 /// The greatest error that is left where nobody says how much may be, as a fraction of the light.
-pub const COARSEST: f64 = 0.007;
+pub const COARSEST: f64 = 0.008;
 
 /// The least, likewise: an eye sees no less, and lightmaps interpolate no better.
 const FINEST: f64 = 0.0015;
