@@ -33,7 +33,7 @@ RESULTS = CHARTS / "results.json"
 FIXTURES = ROOT / "fixtures"
 
 PARTS = ("cornell", "desk", "office", "elements", "blocker")
-GATHER_ERRORS = (0.05, 0.02, 0.007, 0.003)
+GATHER_ERRORS = (0.05, 0.02, 0.007, 0.003, 0.0015)
 POLICIES = ("cob", "gradient", "cob+gradient", "uniform")
 
 # Sweeps of error against elements: thresholds in metres. The uniform mesh grows with their inverse square.
@@ -125,7 +125,7 @@ def sweep_time(bench, name):
         print(f"{name}: no scene in --scenes, or no points in --reference; skipped", file=sys.stderr)
         return
     sizes, gather_errors = {
-        "cornell": ((128, 256, 512, 1024), GATHER_ERRORS),
+        "cornell": ((64, 128, 256, 512, 1024), GATHER_ERRORS),
         "desk": ((256, 512, 1024), GATHER_ERRORS),
         "office": ((512, 1024), GATHER_ERRORS[:3]),
     }[name]
@@ -133,9 +133,10 @@ def sweep_time(bench, name):
         for error in gather_errors:
             options = f"--size {size} --gather-error {error}"
             bench.measure(name, name, scene, reference, options, method="texel", size=size)
+        bench.measure(name, name, scene, reference, f"--size {size}", method="default", size=size)
     if name == "cornell":
         for policy in POLICIES:
-            for size in sizes[:3]:
+            for size in sizes[1:4]:
                 options = f"--direct mesh --refine {policy} --size {size}"
                 bench.measure(name, name, scene, reference, options, method=f"mesh, {policy}", size=size)
 
