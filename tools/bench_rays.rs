@@ -13,8 +13,8 @@ use cobake::solve::sequence;
 use cobake::trace::{FAN, FanStack, Tracer};
 use glam::DVec3;
 
-/// Places on the scene's surfaces from which rays go out.
-const PLACES: u32 = 2000;
+/// Places on the scene's surfaces from which rays go out; whole fans of them.
+const PLACES: u32 = 1984;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "fixtures/desk/scene.glb".into());
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut stack = FanStack::default();
     let targets: Vec<DVec3> = places.iter().map(|(p, _)| *p).collect();
     let count = f64::from(PLACES) * FAN as f64;
-    let to = |i: usize| &targets[i / FAN * FAN..][..FAN];
+    let to = |i: usize| &targets[(i / FAN + 1) * FAN % targets.len()..][..FAN];
     let singly = rate(count, || {
         for (i, (origin, _)) in places.iter().enumerate() {
             for &target in to(i) {
@@ -101,5 +101,6 @@ fn places(triangles: &[[DVec3; 3]]) -> Vec<(DVec3, [DVec3; 3])> {
         }
         before = until;
     }
+    places.truncate(PLACES as usize);
     places
 }

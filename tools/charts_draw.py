@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00", "#CC79A7", "#888888",
 )  # fmt: skip
-MARKERS = {128: "v", 256: "o", 512: "s", 1024: "D"}
+MARKERS = {64: "^", 128: "v", 256: "o", 512: "s", 1024: "D"}
 PEERS = {
     "Mitsuba + OIDN": VERMILION,
     "Mitsuba": ORANGE,
@@ -108,10 +108,17 @@ def time_row(panels, rows, peers):
         texel = [row for row in rows if row["method"] == "texel"]
         for (size,), group in by(texel, "size").items():
             curve(panel, group, "cpu_seconds", name, color=BLUE, marker=MARKERS[size], linewidth=2.0, zorder=3)
+        for row in (row for row in rows if row["method"] == "default"):
+            panel.plot(row["cpu_seconds"], 100 * row[name], color=VERMILION, marker=MARKERS[row["size"]], markersize=8.0,
+                       markeredgecolor="black", linestyle="none", zorder=4)  # fmt: skip
 
 
 def time_legend(panel, rows, peers):
-    handles = [Line2D([], [], color=BLUE, linewidth=2.0, label="cobake, defaults,\n--gather-error swept")]
+    handles = [
+        Line2D([], [], color=VERMILION, marker="o", markersize=8.0, markeredgecolor="black", linestyle="none",
+               label="cobake, defaults"),
+        Line2D([], [], color=BLUE, linewidth=2.0, label="cobake, --gather-error\n0.05 to 0.0015"),
+    ]  # fmt: skip
     here = {row["peer"] for row in peers}
     handles += [
         Line2D([], [], color=color, linestyle="--", linewidth=1.0, label=peer)
@@ -145,7 +152,7 @@ def draw_cornell(rows, peers, folder):
         sizes = {row["size"] for row in rows if row["method"].startswith("mesh")}
         default = [
             row for row in rows
-            if row["method"] == "texel" and row["size"] in sizes and row["options"].endswith("0.007")
+            if row["method"] == "default" and row["size"] in sizes
         ]  # fmt: skip
         curve(panel, default, "cpu_seconds", name, color=VERMILION, linewidth=2.0)
         for row in default:

@@ -124,9 +124,11 @@ impl NullaryFnOnce for Shadows<'_> {
         let mut lengths = [-1.0; FAN];
         for (ray, to) in self.to.iter().enumerate() {
             let way = self.tracer.traced(*to) - origin;
-            lengths[ray] = way.length();
-            let direction = way / lengths[ray];
-            (fan.x[ray], fan.y[ray], fan.z[ray]) = (direction.x, direction.y, direction.z);
+            // Nor does anything stand on no way at all.
+            if let Some(direction) = way.try_normalize() {
+                (fan.x[ray], fan.y[ray], fan.z[ray]) = (direction.x, direction.y, direction.z);
+                lengths[ray] = way.length();
+            }
         }
         let mut met = Met::nothing_within(lengths);
         // One hit is enough: such a ray looks no further.
@@ -351,5 +353,6 @@ mod tests {
             assert!(all[to.len()..].iter().all(|hit| !hit));
         }
         assert!(occluded > 20);
+        assert_eq!(tracer.occluded_all(from, &[from, DVec3::NAN], &mut stack), [false; FAN]);
     }
 }
