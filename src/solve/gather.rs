@@ -376,3 +376,39 @@ impl Gathering<'_> {
 fn level_for(contrast: f64, noise: f64) -> Level {
     Level::of((contrast / noise).powf(4.0 / 3.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn places(count: u64, contrast: f64) -> Contrasts {
+        let mut places = Contrasts::default();
+        places.add(contrast, count);
+        places
+    }
+
+    #[test]
+    fn what_many_places_afford_is_coarser() {
+        let error = |count| affordable_error(&places(count, 0.5), Round::first(COARSEST), 0.0);
+        let errors = [10, 3_000, 10_000, 30_000, 10_000_000].map(error);
+        assert!(errors.windows(2).all(|e| e[0] <= e[1]), "{errors:?}");
+        assert!((errors[0] - FINEST).abs() < 1e-9 && (errors[4] - COARSEST).abs() < 1e-9, "{errors:?}");
+        assert!(errors[2] > FINEST && errors[2] < COARSEST, "{errors:?}");
+    }
+
+    #[test]
+    fn the_affordable_error_costs_no_more_than_said() {
+        let (places, round) = (places(10_000, 0.5), Round::first(0.004));
+        let last = Round::last(affordable_error(&places, round, 1e9));
+        let rays = (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise);
+        assert!(rays <= 2.0 * AFFORDABLE_RAYS && rays > 0.4 * AFFORDABLE_RAYS, "{rays}");
+    }
+
+    #[test]
+    fn places_are_counted_by_contrast() {
+        let rays = |contrast: f64| level_for(contrast, 0.01).rays() as f64;
+        let places = places(3, 0.25);
+        assert!((places.rays(0.01) - 3.0 * rays(0.25)).abs() < 1e-9);
+        assert!(rays(1.0) > rays(0.25));
+    }
+}

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::model::{Baked, Model, cuboid, down, glow, paint, quad, sized, up, v};
+use crate::model::{Baked, Model, both_sides, cuboid, down, glow, paint, quad, sized, up, v};
 use crate::rectangles::{Boxes, Rectangle};
 
 const EMITTED: f64 = 100.0;
@@ -122,4 +122,26 @@ fn boxes_that_pierce_each_other() {
     assert_light(&baked, &boxes, &along(c(x0, y0), c(x0, y1)), DVec3::Z, -DVec3::X, "side lit");
     assert_light(&baked, &boxes, &along(c(x0, y0), c(x1, y0)), DVec3::Z, -DVec3::Y, "side askew");
     assert_light(&baked, &boxes, &along(c(x1, y0), c(x1, y1)), DVec3::Z, DVec3::X, "side shadow");
+}
+
+/// Only reflected light comes here, from the floor. Corners and middles of the wall's elements lie beside the strip,
+/// and agree.
+#[test]
+fn a_strip_before_a_wall() {
+    let strip =
+        |x: f64| quad(v(x, 1.99, 2.31), v(x + 0.6, 1.99, 2.31), v(x + 0.6, 1.99, 2.44), v(x, 1.99, 2.44));
+    let baked = Model::new()
+        .add(&paint(0.8), &up((-2.0, -2.0), (2.0, 2.0), 0.0))
+        .add(&paint(0.5), &quad(v(-2.0, 2.0, 0.0), v(2.0, 2.0, 0.0), v(2.0, 2.0, 4.0), v(-2.0, 2.0, 4.0)))
+        .add(&both_sides(paint(0.0)), &[-1.3, 0.13].map(strip).concat())
+        .add(&glow(EMITTED), &down((-0.5, -0.5), (0.5, 0.5), 2.0))
+        .bake(&sized(256));
+    for x in [-1.0, 0.43] {
+        let beside = baked.at(v(x, 2.0, 2.7), -DVec3::Y);
+        let behind = baked.at(v(x, 2.0, 2.375), -DVec3::Y);
+        assert!(
+            beside > 0.3 && behind < 0.1 * beside,
+            "behind the strip at {x}: {behind}, beside it {beside}"
+        );
+    }
 }
