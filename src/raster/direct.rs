@@ -16,7 +16,7 @@ use super::fit::{FitTexel, LightSample, fit};
 use super::penumbra::{SmoothBlock, is_soft};
 use super::ways::TexelWays;
 use crate::geom::Frame;
-use crate::geom::polygon::{Ring, contains, nearest_on_segment, rectangle};
+use crate::geom::polygon::{contains, nearest_on_segment, rectangle};
 use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
@@ -317,9 +317,10 @@ impl Shining<'_> {
         let mut samples = Vec::new();
         let is_bright = most > DIM * self.light.typical;
         if is_bright && (texels.len() == 1 || most - least > SMOOTH * most) {
+            let outlines = self.outlines_near(texels);
             for texel in texels.iter_mut().filter(|t| t.covering == Covering::Seen) {
                 let first = samples.len();
-                self.sample(texel, between, (&mut evaluation, &mut samples));
+                self.sample(texel, between, &outlines, (&mut evaluation, &mut samples));
                 let own = &samples[first..];
                 if !own.is_empty() {
                     texel.now = own.iter().map(|s| s.light).sum::<DVec3>() / own.len() as f64;
@@ -332,11 +333,27 @@ impl Shining<'_> {
         Done { ways, effort: evaluation.effort, samples }
     }
 
-    /// Light at points of the texel's square that lie in its region.
+    /// The edges of all regions' outlines that may pass through the texels' squares.
+    fn outlines_near(&self, texels: &[LitTexel]) -> Vec<[DVec2; 2]> {
+        let [right, down] = self.cover.step;
+        let (low, high) = extent(texels);
+        let reach = 2.0 * (right.abs() + down.abs());
+        let (low, high) = (low - reach, high + reach);
+        let edges = self
+            .surface
+            .regions
+            .iter()
+            .flat_map(|r| &r.rings)
+            .flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)).map(|(&a, &b)| [a, b]));
+        edges.filter(|[a, b]| a.max(*b).cmpge(low).all() && a.min(*b).cmple(high).all()).collect()
+    }
+
+    /// Light at points of the texel's square that lie in its region; `outlines` are those near it.
     fn sample(
         &self,
         texel: &LitTexel,
         between: &[&[DVec3]],
+        outlines: &[[DVec2; 2]],
         (evaluation, samples): (&mut Evaluation, &mut Vec<LightSample>),
     ) {
         let rings = self.surface.regions.get(texel.region as usize).map_or(&[][..], |r| &r.rings);
@@ -345,21 +362,20 @@ impl Shining<'_> {
             let place = DVec2::new((k % POINTS_A_SIDE).into(), (k / POINTS_A_SIDE).into());
             let at = corner + (place + 0.5) / f64::from(POINTS_A_SIDE);
             let point = self.plane_from_texel.transform_point2(at);
-            if contains(rings, point) && !self.is_at_outline(rings, point) && !self.cover.hides(point) {
+            let is_inside =
+                outlines.is_empty() || (contains(rings, point) && !self.is_at_outline(outlines, point));
+            if is_inside && !self.cover.hides(point) {
                 let light = self.irradiance(point, Between::Polygons(between), evaluation);
                 samples.push(LightSample { at, light });
             }
         }
     }
 
-    /// Whether a point lies on its region's outline: where an emitter stands on that, it is seen edge-on from there.
-    fn is_at_outline(&self, rings: &[Ring], point: DVec2) -> bool {
+    /// Whether a point lies on an outline: where an emitter stands on that, it is seen edge-on from there.
+    fn is_at_outline(&self, outlines: &[[DVec2; 2]], point: DVec2) -> bool {
         let [right, down] = self.cover.step;
         let least = OUTLINE * right.length().min(down.length());
-        rings.iter().any(|ring| {
-            let ends = ring.iter().zip(ring.iter().cycle().skip(1));
-            ends.into_iter().any(|(&a, &b)| nearest_on_segment(a, b, point).distance(point) < least)
-        })
+        outlines.iter().any(|&[a, b]| nearest_on_segment(a, b, point).distance(point) < least)
     }
 
     fn irradiance(&self, point: DVec2, between: Between, evaluation: &mut Evaluation) -> DVec3 {

@@ -123,6 +123,11 @@ impl Places {
                 }
             }
         }
+        // Those of few corners are asked first, and the one of most, which may have a hundred holes, never.
+        let corners = |f: &u32| facets[*f as usize].rings.iter().map(Vec::len).sum::<usize>();
+        for here in touched.iter_mut().filter(|t| t.len() > 1) {
+            here.sort_by_key(corners);
+        }
         for &front in touched.iter().filter(|t| t.len() > 1).flatten() {
             if rings[front as usize].is_empty() {
                 rings[front as usize].clone_from(&facets[front as usize].rings);
@@ -150,9 +155,9 @@ impl Places {
         match self.facets_in(self.cell(p)) {
             [] => self.facets.first().map(|&f| f as usize),
             [only] => Some(*only as usize),
-            here @ [first, ..] => {
-                let found = here.iter().find(|&&f| contains(&rings[f as usize], p));
-                Some(*found.unwrap_or(first) as usize)
+            [some @ .., last] => {
+                let found = some.iter().find(|&&f| contains(&rings[f as usize], p));
+                Some(*found.unwrap_or(last) as usize)
             }
         }
     }
