@@ -15,8 +15,8 @@ use super::coverage::TexelSite;
 use super::fit::{FitTexel, LightSample, fit};
 use super::penumbra::{SmoothBlock, is_soft};
 use super::ways::TexelWays;
-use crate::geom::Frame;
 use crate::geom::polygon::{contains, nearest_on_segment, rectangle};
+use crate::geom::{Bounds, Frame};
 use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
@@ -43,6 +43,10 @@ const SMOOTH: f64 = 0.3;
 /// Light from one emitter that is everywhere below this fraction of the scene's typical light is taken once a
 /// texel, too.
 const DIM: f64 = 0.02;
+
+/// Shadows of an emitter that gives less than this fraction of the scene's typical light are too faint to be looked
+/// for: what a smooth penumbra may miss is more.
+const FAINT: f64 = 0.002;
 
 /// Where a shadow's edge crosses a texel, light is evaluated at this many points a side of it.
 const POINTS_A_SIDE: u32 = 3;
@@ -284,7 +288,7 @@ impl Shining<'_> {
         evaluation.effort
     }
 
-    /// A block that soft shadows fall on, if their light is smooth all over it.
+    /// A block that soft shadows fall on, or faint ones, if their light is smooth all over it.
     fn smooth_penumbra(
         &self,
         texels: &mut [LitTexel],
@@ -293,7 +297,9 @@ impl Shining<'_> {
         between: &[u32],
     ) -> Option<Done> {
         let occluders = self.light.occluders.polygons(self.light.tracer, between);
-        if !is_soft(hull, self.emitter, &occluders, self.light.tracer.diagonal()) {
+        let is_faint = self.emitter.at_most(Bounds::of(*hull), self.light.tracer.diagonal())
+            < FAINT * self.light.typical;
+        if !is_faint && !is_soft(hull, self.emitter, &occluders, self.light.tracer.diagonal()) {
             return None;
         }
         let mut evaluation = Evaluation::new(Precision::EMITTER);

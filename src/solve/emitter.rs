@@ -6,8 +6,9 @@ use glam::DVec3;
 
 use super::form_factor::{SurfacePoint, signed_point_to_polygon};
 use super::visible::{ConvexParts, Workspace, visible_form_factor};
-use crate::geom::Frame;
 use crate::geom::hull::convex_hull;
+use crate::geom::{Bounds, Frame};
+use crate::light::luminance;
 use crate::scene::{PunctualKind, PunctualLight};
 use crate::trace::shaft::Shaft;
 use crate::trace::{FAN, FanStack, Tracer};
@@ -366,6 +367,20 @@ impl Emitter {
         }
     }
 
+    /// No place in `block` receives more luminance from it than this; `diagonal` is the scene's.
+    #[must_use]
+    pub fn at_most(&self, block: Bounds, diagonal: f64) -> f64 {
+        match self {
+            Self::Area(area) => {
+                let centre = self.centre(block.centre(), diagonal);
+                let nearest = (block.distance(centre) - area.diameter_squared.sqrt()).max(0.0);
+                let form_factor = area.area / (PI * nearest * nearest);
+                luminance(area.exitance) * form_factor.min(1.0)
+            }
+            Self::Punctual(_) => f64::INFINITY,
+        }
+    }
+
     /// The shaft from a convex receiving polygon to the emitter.
     #[must_use]
     pub fn shaft(&self, receiver: &[DVec3], tracer: &Tracer) -> Shaft {
@@ -448,7 +463,7 @@ impl Emitter {
     pub fn width(&self) -> Option<f64> {
         match self {
             Self::Area(area) => {
-                let bounds = crate::geom::Bounds::of(area.hull.iter().copied());
+                let bounds = Bounds::of(area.hull.iter().copied());
                 Some(area.area / bounds.diagonal())
             }
             Self::Punctual(_) => None,
