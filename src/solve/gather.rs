@@ -15,6 +15,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::budget::{Contrasts, Round, level_for};
 use super::contact::Nearby;
 use super::direct::DirectPass;
 use super::emitter::{AreaEmitter, Evaluation, Precision, irradiance_by_rays};
@@ -27,80 +28,6 @@ use crate::geom::Frame;
 use crate::light::luminance;
 use crate::options::Refine;
 use crate::trace::FanStack;
-
-/// How far a round goes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Round {
-    /// The standard error of a place's light that its rays may leave, as a fraction of the light there.
-    pub noise: f64,
-    /// The error in an element's middle that calls for a split, likewise.
-    pub tolerance: f64,
-}
-
-impl Round {
-    /// The first shows the last how light varies within patches.
-    #[must_use]
-    pub fn first(error: f64) -> Self {
-        Self { noise: 4.0 * error, tolerance: 12.0 * error }
-    }
-
-    /// The last makes the light that the lightmap holds; its rays may leave this `error`.
-    #[must_use]
-    pub fn last(error: f64) -> Self {
-        Self { noise: error, tolerance: 5.0 * error }
-    }
-}
-
-/// The greatest error that is left where nobody says how much may be, as a fraction of the light.
-pub const COARSEST: f64 = 0.008;
-
-/// The least, likewise: an eye sees no less, and lightmaps interpolate no better.
-const FINEST: f64 = 0.0015;
-
-/// An error below the greatest costs no more rays than this, some two seconds of one core,
-const AFFORDABLE_RAYS: f64 = 1.2e7;
-
-/// and this many for each texel, since more texels show more of it, until these have doubled the former.
-const AFFORDABLE_RAYS_A_TEXEL: f64 = 50.0;
-
-/// The number of places grows with this power of the tolerance's inverse.
-const GROWTH: f64 = 0.4;
-
-/// The least error that costs the last round no more than the affordable number of rays for a page of so many
-/// `texels`, told by the `places` of a `round` before.
-#[must_use]
-pub fn affordable_error(places: &Contrasts, round: Round, texels: f64) -> f64 {
-    let affordable = AFFORDABLE_RAYS + (AFFORDABLE_RAYS_A_TEXEL * texels).min(AFFORDABLE_RAYS);
-    let rays = |last: Round| (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise);
-    let steps = 32;
-    let error = |step: i32| FINEST * (COARSEST / FINEST).powf(f64::from(step) / f64::from(steps));
-    (0..steps).map(error).find(|&e| rays(Round::last(e)) <= affordable).unwrap_or(COARSEST)
-}
-
-/// How many places gathered, by the contrast of what they see.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Contrasts([u64; Self::CLASSES]);
-
-impl Contrasts {
-    const CLASSES: usize = 32;
-
-    /// Classes for each doubling.
-    const FINENESS: f64 = 2.0;
-
-    /// The class of contrast 1.
-    const ONE: f64 = 16.0;
-
-    fn add(&mut self, contrast: f64, places: u64) {
-        let class = (contrast.log2() * Self::FINENESS + Self::ONE).round();
-        self.0[(class.max(0.0) as usize).min(Self::CLASSES - 1)] += places;
-    }
-
-    /// The rays that bring the error of all places down to `noise`.
-    fn rays(&self, noise: f64) -> f64 {
-        let contrast = |class: usize| ((class as f64 - Self::ONE) / Self::FINENESS).exp2();
-        self.0.iter().enumerate().map(|(c, &n)| n as f64 * level_for(contrast(c), noise).rays() as f64).sum()
-    }
-}
 
 /// In the dark, errors are measured by this fraction of the scene's mean light.
 pub(super) const LEAST_REFERENCE: f64 = 0.5;
@@ -141,7 +68,7 @@ impl GatherCounts {
         self.places += other.places;
         self.splits += other.splits;
         self.rays += other.rays;
-        self.contrasts.0.iter_mut().zip(other.contrasts.0).for_each(|(sum, n)| *sum += n);
+        self.contrasts.add_all(&other.contrasts);
     }
 }
 
@@ -368,47 +295,5 @@ impl Gathering<'_> {
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
         let hot = irradiance_by_rays(hot_spots, point, tracer, negligible, &mut self.evaluation);
         Gathered { irradiance: sum / rays + hot, distance: rays / nearness }
-    }
-}
-
-/// How many rays bring the error down to `noise` where single ones deviate by `contrast`: strata of the hemisphere
-/// make it fall with the power of 3/4.
-fn level_for(contrast: f64, noise: f64) -> Level {
-    Level::of((contrast / noise).powf(4.0 / 3.0))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn places(count: u64, contrast: f64) -> Contrasts {
-        let mut places = Contrasts::default();
-        places.add(contrast, count);
-        places
-    }
-
-    #[test]
-    fn what_many_places_afford_is_coarser() {
-        let error = |count| affordable_error(&places(count, 0.5), Round::first(COARSEST), 0.0);
-        let errors = [10, 3_000, 10_000, 30_000, 10_000_000].map(error);
-        assert!(errors.windows(2).all(|e| e[0] <= e[1]), "{errors:?}");
-        assert!((errors[0] - FINEST).abs() < 1e-9 && (errors[4] - COARSEST).abs() < 1e-9, "{errors:?}");
-        assert!(errors[2] > FINEST && errors[2] < COARSEST, "{errors:?}");
-    }
-
-    #[test]
-    fn the_affordable_error_costs_no_more_than_said() {
-        let (places, round) = (places(10_000, 0.5), Round::first(0.004));
-        let last = Round::last(affordable_error(&places, round, 1e9));
-        let rays = (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise);
-        assert!(rays <= 2.0 * AFFORDABLE_RAYS && rays > 0.4 * AFFORDABLE_RAYS, "{rays}");
-    }
-
-    #[test]
-    fn places_are_counted_by_contrast() {
-        let rays = |contrast: f64| level_for(contrast, 0.01).rays() as f64;
-        let places = places(3, 0.25);
-        assert!((places.rays(0.01) - 3.0 * rays(0.25)).abs() < 1e-9);
-        assert!(rays(1.0) > rays(0.25));
     }
 }

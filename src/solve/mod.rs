@@ -6,6 +6,7 @@
 //! most unshot power first, until the unshot power is a small fraction of the emitted; and
 //! what all reflect in the end is gathered by the elements ([`mod@gather`]).
 
+pub mod budget;
 pub mod contact;
 pub mod direct;
 pub mod emitter;
@@ -29,10 +30,11 @@ use crate::options::BakeOptions;
 use crate::scene::PunctualLight;
 use crate::surface::Surface;
 use crate::trace::Tracer;
+use budget::{COARSEST, Round, affordable_error};
 use direct::{DirectPass, ShotCounts};
 use emitter::{AreaEmitter, Emitter};
 use field::RadiosityField;
-use gather::{COARSEST, GatherCounts, Round, Source, affordable_error, gather};
+use gather::{GatherCounts, Source, gather};
 use hot::HotSpots;
 use locate::FacetLocator;
 use patches::{Energy, Patches};

@@ -1,0 +1,160 @@
+//! An emitter seen along a few rays, where what hides it is too much to be cut away, or it too small.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::{AreaEmitter, Evaluation};
+use crate::solve::form_factor::SurfacePoint;
+use crate::trace::{FAN, Tracer};
+
+/// A grid of points on an emitter, to which rays go; each part of one that is no single polygon has its share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayGrid {
+    /// Two a side.
+    Coarse,
+    /// Four a side.
+    Medium,
+    /// Eight a side.
+    Fine,
+}
+
+impl RayGrid {
+    pub(super) const ALL: [Self; 3] = [Self::Coarse, Self::Medium, Self::Fine];
+
+    fn points_a_side(self) -> u32 {
+        2 << self as u32
+    }
+}
+
+/// What is this many of its diameters away is far.
+const FAR: f64 = 5.0;
+
+impl Evaluation {
+    /// What arrives at `receiver` along those of the rays that nothing stops.
+    fn seen_along_rays(&mut self, receiver: SurfacePoint, tracer: &Tracer) -> DVec3 {
+        let mut seen = DVec3::ZERO;
+        for rays in self.rays.chunks(FAN) {
+            let mut to = [DVec3::ZERO; FAN];
+            to.iter_mut().zip(rays).for_each(|(to, ray)| *to = ray.0);
+            let occluded = tracer.occluded_all(receiver.position, &to[..rays.len()], &mut self.stack);
+            seen += rays
+                .iter()
+                .zip(occluded)
+                .filter(|(_, occluded)| !occluded)
+                .map(|(ray, _)| ray.1)
+                .sum::<DVec3>();
+        }
+        self.effort.rays += self.rays.len() as u64;
+        seen
+    }
+}
+
+impl AreaEmitter {
+    /// The kernel-weighted fraction of sample points in sight.
+    pub(super) fn fraction_by_rays(
+        &self,
+        receiver: SurfacePoint,
+        tracer: &Tracer,
+        e: &mut Evaluation,
+    ) -> f64 {
+        let grid = e.precision.rays;
+        let all = self.told_by_points(receiver, grid);
+        e.rays.clear();
+        self.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, DVec3::splat(part / all))));
+        e.seen_along_rays(receiver, tracer).x
+    }
+
+    /// The form factor from `receiver` with nothing between, as its points tell it.
+    fn told_by_points(&self, receiver: SurfacePoint, grid: RayGrid) -> f64 {
+        self.grids[grid as usize].iter().map(|&(q, share)| share * self.kernel(receiver, q)).sum()
+    }
+
+    /// What the form factor from `receiver` would be if all of it were at `q`.
+    fn kernel(&self, receiver: SurfacePoint, q: DVec3) -> f64 {
+        let d = q - receiver.position;
+        let square = d.length_squared();
+        let cosines = receiver.normal.dot(d).max(0.0) * (-self.frame.normal.dot(d)).max(0.0);
+        self.area * cosines / (PI * square * square)
+    }
+
+    /// Gives points all over it, lifted by `margin`, and what each is told to be of the form factor at `receiver`,
+    /// but those that cannot shine there.
+    fn aim(&self, receiver: SurfacePoint, margin: f64, grid: RayGrid, mut give: impl FnMut(DVec3, f64)) {
+        let lift = self.frame.normal * margin;
+        for &(q, share) in &self.grids[grid as usize] {
+            let part = share * self.kernel(receiver, q);
+            if part > 0.0 {
+                give(q + lift, part);
+            }
+        }
+    }
+
+    /// Whether it is so far away that few points tell its form factor to a hundredth.
+    fn is_far(&self, from: DVec3) -> bool {
+        let nearest = self.hull.iter().map(|q| q.distance_squared(from)).fold(f64::INFINITY, f64::min);
+        nearest > FAR * FAR * self.diameter_squared
+    }
+}
+
+/// Points all over convex `parts`, and the share of their area that each stands for.
+pub(super) fn grid_points(parts: &[Vec<DVec3>], grid: RayGrid) -> Vec<(DVec3, f64)> {
+    let whole: f64 = parts.iter().map(|p| fan_area(p)).sum();
+    let most = grid.points_a_side();
+    let mut points = Vec::new();
+    for part in parts {
+        let share = fan_area(part) / whole;
+        let side = ((f64::from(most) * share.sqrt()).ceil() as u32).clamp(1, most);
+        points.extend((0..side * side).map(|k| {
+            let u = (f64::from(k % side) + 0.5) / f64::from(side);
+            let v = (f64::from(k / side) + 0.5) / f64::from(side);
+            (point_in_fan(part, u, v), share / f64::from(side * side))
+        }));
+    }
+    points
+}
+
+/// The irradiance that all `emitters` give to `receiver`, visibility counted by a few rays each; without those that
+/// would give no more than `negligible` with nothing between.
+#[must_use]
+pub fn irradiance_by_rays(
+    emitters: &[AreaEmitter],
+    receiver: SurfacePoint,
+    tracer: &Tracer,
+    negligible: f64,
+    e: &mut Evaluation,
+) -> DVec3 {
+    e.rays.clear();
+    for emitter in emitters {
+        let grid = e.precision.rays;
+        let told = emitter.told_by_points(receiver, grid);
+        let form_factor = if emitter.is_far(receiver.position) { told } else { emitter.unoccluded(receiver) };
+        if told > 0.0 && emitter.exitance.max_element() * form_factor > negligible {
+            let arriving = emitter.exitance * (form_factor / told);
+            emitter.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, arriving * part)));
+        }
+    }
+    e.seen_along_rays(receiver, tracer)
+}
+
+pub(in crate::solve) fn fan_area(part: &[DVec3]) -> f64 {
+    (1..part.len().saturating_sub(1))
+        .map(|i| crate::geom::triangle::area([part[0], part[i], part[i + 1]]))
+        .sum()
+}
+
+/// Maps the unit square onto a convex polygon, area for area.
+pub(in crate::solve) fn point_in_fan(part: &[DVec3], u: f64, v: f64) -> DVec3 {
+    let mut target = u * fan_area(part);
+    let last = part.len() - 2;
+    for i in 1..=last {
+        let area = crate::geom::triangle::area([part[0], part[i], part[i + 1]]);
+        if target <= area || i == last {
+            let s = if area > 0.0 { (target / area).clamp(0.0, 1.0) } else { 0.5 };
+            let r = v.sqrt();
+            return part[0].lerp(part[i].lerp(part[i + 1], s), r);
+        }
+        target -= area;
+    }
+    part[0]
+}
