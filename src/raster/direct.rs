@@ -1,10 +1,12 @@
 //! Direct light in texels: closed form, and rays or cutting only where a shadow's edge falls.
 //!
 //! A surface's texels are halved into ever smaller blocks. For each block and emitter, what
-//! stands in the shaft between them is handed down from the larger block and filtered. An
-//! empty shaft means closed form for all of the block's texels; one occluder that hides
-//! everything, zero; only small blocks that a shadow's edge crosses ask for visibility,
-//! and those take several points a texel, which the texels are then fitted to.
+//! stands in the shaft between them is handed down from the larger block, and filtered
+//! whenever blocks have become clearly smaller. An empty shaft means closed form for all of
+//! the block's texels; one occluder that hides everything, zero; a wide penumbra is
+//! interpolated between a few exact values; only small blocks that a shadow's edge crosses
+//! ask for visibility in every texel, and take several points a texel, which the texels are
+//! then fitted to.
 
 use std::collections::HashSet;
 
@@ -44,8 +46,8 @@ const SMOOTH: f64 = 0.3;
 /// texel, too.
 const DIM: f64 = 0.02;
 
-/// Shadows of an emitter that gives less than this fraction of the scene's typical light are too faint to be looked
-/// for: what a smooth penumbra may miss is more.
+/// Shadows of emitters that all together give less than this fraction of the scene's typical light are too faint to
+/// be looked for: as much may be missed in a smooth penumbra.
 const FAINT: f64 = 0.002;
 
 /// Where a shadow's edge crosses a texel, light is evaluated at this many points a side of it.
@@ -298,7 +300,7 @@ impl Shining<'_> {
     ) -> Option<Done> {
         let occluders = self.light.occluders.polygons(self.light.tracer, between);
         let is_faint = self.emitter.at_most(Bounds::of(*hull), self.light.tracer.diagonal())
-            < FAINT * self.light.typical;
+            < FAINT * self.light.typical / self.light.emitters.len() as f64;
         if !is_faint && !is_soft(hull, self.emitter, &occluders, self.light.tracer.diagonal()) {
             return None;
         }
@@ -368,8 +370,8 @@ impl Shining<'_> {
             let place = DVec2::new((k % POINTS_A_SIDE).into(), (k / POINTS_A_SIDE).into());
             let at = corner + (place + 0.5) / f64::from(POINTS_A_SIDE);
             let point = self.plane_from_texel.transform_point2(at);
-            let is_inside =
-                outlines.is_empty() || (contains(rings, point) && !self.is_at_outline(outlines, point));
+            let is_inside = (outlines.is_empty() && !rings.is_empty())
+                || (contains(rings, point) && !self.is_at_outline(outlines, point));
             if is_inside && !self.cover.hides(point) {
                 let light = self.irradiance(point, Between::Polygons(between), evaluation);
                 samples.push(LightSample { at, light });

@@ -6,8 +6,8 @@
 //! 1993 call it the local pass). The rays of a place are well distributed and their number
 //! follows from how much what they meet varies; all of a facet's places look in the same
 //! directions, so that what is left of the error is smooth. Elements are split where the light
-//! in their middle is not what their samples say: a posteriori, as the gradient policy does
-//! for direct light.
+//! in their middle, or under what stands close over them, is not what their samples say: a
+//! posteriori, as the gradient policy does for direct light.
 //!
 //! It costs the same in scenes of ten and of ten thousand surfaces, and where light is even it
 //! is exact, in corners and under contacts, too.

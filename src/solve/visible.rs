@@ -18,6 +18,9 @@ use super::form_factor::{SurfacePoint, signed_point_to_polygon};
 /// part's edges do not occur with the few occluders that are subtracted exactly.
 const MOST_CORNERS: usize = 12;
 
+/// An edge that is seen under a smaller angle has no direction to speak of.
+const SHORT: f64 = 1e-12;
+
 /// A convex polygon of few corners, relative to the receiving point.
 #[derive(Clone, Copy)]
 struct Part {
@@ -183,9 +186,10 @@ impl Pyramid {
         let mut pyramid = Self::EMPTY;
         let inner = polygon.corners().iter().sum::<DVec3>();
         for (i, a) in polygon.corners().iter().enumerate() {
-            let side = a.cross(polygon.corners[if i + 1 == polygon.count { 0 } else { i + 1 }]);
+            let b = polygon.corners[if i + 1 == polygon.count { 0 } else { i + 1 }];
+            let side = a.cross(b);
             // A side seen edge-on, or an edge too short to matter, bounds nothing.
-            if side.length_squared() > 0.0 {
+            if side.length_squared() > SHORT * SHORT * a.length_squared() * b.length_squared() {
                 pyramid.sides[pyramid.count] = if side.dot(inner) >= 0.0 { side } else { -side };
                 pyramid.count += 1;
             }
