@@ -170,6 +170,10 @@ struct Done {
 }
 
 impl Done {
+    fn of(ways: TexelWays, effort: Effort) -> Self {
+        Self { ways, effort, samples: Vec::new() }
+    }
+
     fn and(mut self, other: Self) -> Self {
         self.ways.add(&other.ways);
         self.effort.add(other.effort);
@@ -196,9 +200,9 @@ struct Shining<'a> {
 /// What a block inherits from a larger one.
 #[derive(Clone, Copy)]
 struct Inherited<'a> {
-    /// What reaches into that one's shaft; `None` where it had none.
+    /// What reaches into that one's shaft; `None` for a surface's whole, which inherits nothing.
     between: Option<&'a [u32]>,
-    /// Texels in that one.
+    /// Texels in that one; the most that there can be where there is none.
     texels: usize,
 }
 
@@ -218,22 +222,19 @@ impl Shining<'_> {
         let hull = self.block(extent);
         let count = texels.len() as u64;
         if self.emitter.is_behind(&hull, frame.normal, tracer.margin()) {
-            return Done { ways: TexelWays { behind: count, ..TexelWays::default() }, ..Done::default() };
+            return Done::of(TexelWays { behind: count, ..TexelWays::default() }, Effort::default());
         }
         // A block that is not much smaller than the one before has about the same shaft.
-        if let Some(between) = inherited.between
-            && texels.len() > SMALL_BLOCK
-            && texels.len() > inherited.texels / BLOCKS_A_SHAFT
-        {
-            return self.halve(texels, extent, Inherited { between: Some(between), ..inherited });
+        if texels.len() > SMALL_BLOCK.max(inherited.texels / BLOCKS_A_SHAFT) {
+            return self.halve(texels, extent, inherited);
         }
         let between = self.emitter.between(&hull, tracer, inherited.between);
         if between.is_empty() {
-            let ways = TexelWays { lit: count, ..TexelWays::default() };
-            return Done { ways, effort: self.shine_freely(texels), samples: Vec::new() };
+            let effort = self.shine_freely(texels);
+            return Done::of(TexelWays { lit: count, ..TexelWays::default() }, effort);
         }
         if self.light.occluders.one_hides(&hull, self.emitter, tracer, &between) {
-            return Done { ways: TexelWays { umbra: count, ..TexelWays::default() }, ..Done::default() };
+            return Done::of(TexelWays { umbra: count, ..TexelWays::default() }, Effort::default());
         }
         if texels.len() <= SMALL_BLOCK {
             return self.shadow_edge(texels, &self.light.occluders.polygons(tracer, &between));
@@ -309,7 +310,7 @@ impl Shining<'_> {
         let block = SmoothBlock::fit(extent, self.light.typical, light)?;
         texels.iter_mut().for_each(|t| t.now = block.at(t.point));
         let ways = TexelWays { smooth: texels.len() as u64, ..TexelWays::default() };
-        Some(Done { ways, effort: evaluation.effort, samples: Vec::new() })
+        Some(Done::of(ways, evaluation.effort))
     }
 
     /// A small block in which shadow may fall: one point a texel where the light changes little from texel

@@ -7,8 +7,8 @@
 use glam::{DVec2, DVec3};
 
 use crate::element::Facet;
-use crate::geom::Bounds;
-use crate::geom::polygon::signed_area;
+use crate::geom::polygon::{clip_half_plane, clip_rectangle, signed_area};
+use crate::geom::{Bounds, Ring};
 use crate::trace::Tracer;
 
 /// What covers less of an element than this fraction leaves no mark that elements could show.
@@ -28,18 +28,16 @@ impl Nearby {
         self.0.clear();
         tracer.triangles_in(Bounds::of(feet.into_iter().chain(above)), &mut self.0);
         let area = (e.max - e.min).element_product();
-        let space = (e.min.extend(tracer.margin()), e.max.extend(size));
         let mut most: Option<(f64, DVec2)> = None;
         for &triangle in &self.0 {
             let corners = tracer.triangles()[triangle as usize];
-            let over = inside(&corners.map(|p| frame.project(p).extend(frame.height(p))), space);
-            let cover: Vec<DVec2> = over.iter().map(|p| p.truncate()).collect();
+            let corners = corners.map(|p| frame.project(p).extend(frame.height(p)));
+            let (cover, lowest) = cover(corners, (e.min.extend(tracer.margin()), e.max.extend(size)));
             let covered = signed_area(&cover).abs();
             if covered < LEAST_COVER * area {
                 continue;
             }
             let middle = cover.iter().sum::<DVec2>() / cover.len() as f64;
-            let lowest = over.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
             let closeness = covered / lowest;
             if most.is_none_or(|(best, _)| closeness > best) && facet.contains(element, middle) {
                 most = Some((closeness, middle));
@@ -49,26 +47,22 @@ impl Nearby {
     }
 }
 
-/// What of a convex polygon lies in a box (Sutherland and Hodgman 1974).
-fn inside(polygon: &[DVec3], (min, max): (DVec3, DVec3)) -> Vec<DVec3> {
-    let mut polygon = polygon.to_vec();
-    for axis in 0..3 {
-        for (sign, bound) in [(1.0, min[axis]), (-1.0, -max[axis])] {
-            let height = |p: DVec3| sign * p[axis] - bound;
-            let mut kept = Vec::with_capacity(polygon.len() + 1);
-            for (i, &b) in polygon.iter().enumerate() {
-                let a = polygon[if i == 0 { polygon.len() - 1 } else { i - 1 }];
-                if (height(a) < 0.0) != (height(b) < 0.0) {
-                    kept.push(a.lerp(b, height(a) / (height(a) - height(b))));
-                }
-                if height(b) >= 0.0 {
-                    kept.push(b);
-                }
-            }
-            polygon = kept;
-        }
+/// What a triangle covers of a box's foot with its part inside the box, and how high that is where it is lowest.
+///
+/// Coordinates are those of the plane and the height over it. An upright triangle covers nothing.
+fn cover([a, b, c]: [DVec3; 3], (min, max): (DVec3, DVec3)) -> (Ring, f64) {
+    let normal = (b - a).cross(c - a);
+    if normal.z == 0.0 {
+        return (Ring::new(), f64::INFINITY);
     }
-    polygon
+    // The height is `base + slope · p`.
+    let slope = -normal.truncate() / normal.z;
+    let base = a.z - slope.dot(a.truncate());
+    let over = clip_rectangle(&[a, b, c].map(|p| p.truncate()), min.truncate(), max.truncate());
+    let over = clip_half_plane(&over, slope, min.z - base);
+    let over = clip_half_plane(&over, -slope, base - max.z);
+    let lowest = over.iter().map(|&p| base + slope.dot(p)).fold(f64::INFINITY, f64::min);
+    (over, lowest)
 }
 
 #[cfg(test)]
@@ -78,12 +72,11 @@ mod tests {
     #[test]
     fn what_reaches_out_of_the_box_is_cut() {
         let slope = [DVec3::new(-1.0, 0.0, -1.0), DVec3::new(3.0, 0.0, 3.0), DVec3::new(3.0, 4.0, 3.0)];
-        let cut = inside(&slope, (DVec3::new(0.0, 0.0, 0.5), DVec3::new(2.0, 2.0, 2.0)));
-        let lowest = cut.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
-        assert!((lowest - 0.5).abs() < 1e-12, "{cut:?}");
-        let area = signed_area(&cut.iter().map(|p| p.truncate()).collect::<Vec<_>>()).abs();
+        let (over, lowest) = cover(slope, (DVec3::new(0.0, 0.0, 0.5), DVec3::new(2.0, 2.0, 2.0)));
+        assert!((lowest - 0.5).abs() < 1e-12, "{over:?}");
+        let area = signed_area(&over).abs();
         // Under the line y = x + 1 between x = 0.5 and 2, and no further than y = 2.
         assert!((area - (1.5 * 2.0 - 0.5 * 0.5 * 0.5)).abs() < 1e-12, "{area}");
-        assert!(inside(&slope, (DVec3::splat(5.0), DVec3::splat(6.0))).is_empty());
+        assert!(cover(slope, (DVec3::splat(5.0), DVec3::splat(6.0))).0.is_empty());
     }
 }

@@ -79,6 +79,8 @@ pub struct Source<'a> {
     pub field: &'a RadiosityField<'a>,
     /// What is too bright and too small for them.
     pub hot_spots: &'a [AreaEmitter],
+    /// Where all places look.
+    pub directions: &'a Directions,
 }
 
 /// Gathers what `source` reflects on all facets, in place of the reflected light that they had. `receivers`
@@ -90,7 +92,6 @@ pub fn gather(
     round: Round,
     facets: &mut [Facet],
 ) -> GatherCounts {
-    let directions = Directions::prepare();
     let counts: Vec<GatherCounts> = facets
         .par_iter_mut()
         .zip(receivers)
@@ -100,7 +101,6 @@ pub fn gather(
                 pass,
                 source,
                 round,
-                directions: &directions,
                 level: Level::LEAST,
                 stack: FanStack::default(),
                 nearby: Nearby::default(),
@@ -129,8 +129,7 @@ struct Gathering<'a> {
     pass: &'a DirectPass<'a>,
     source: Source<'a>,
     round: Round,
-    directions: &'a Directions,
-    /// How many of them a place takes.
+    /// How many of the directions a place takes.
     level: Level,
     stack: FanStack,
     nearby: Nearby,
@@ -281,10 +280,10 @@ impl Gathering<'_> {
 
     fn at(&mut self, point: SurfacePoint) -> Gathered {
         let tracer = self.pass.tracer;
-        let fans = self.directions.fans(self.level);
+        let fans = self.source.directions.fans(self.level);
         let Frame { u, v, normal, .. } = self.facet.frame;
         let (mut sum, mut nearness) = (DVec3::ZERO, 0.0);
-        let Source { field, hot_spots } = self.source;
+        let Source { field, hot_spots, .. } = self.source;
         tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at| {
             sum += field.radiosity(tracer, hit, at).as_dvec3();
             nearness += 1.0 / hit.distance.max(tracer.margin());

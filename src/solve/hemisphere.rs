@@ -48,7 +48,7 @@ impl Directions {
         let fans = (0..LEVELS).map(|level| {
             let points = (0..Level(level).rays() as u32).map(|index| sequence::point(index, 0));
             let mut square: Vec<[f64; 2]> = points.map(|[u, v, ..]| [u, v]).collect();
-            square.sort_by_key(|&[u, v]| interleaved(u, v));
+            square.sort_by_cached_key(|&[u, v]| interleaved(u, v));
             let directions: Vec<DVec3> = square.into_iter().map(|[u, v]| cosine_direction(u, v)).collect();
             directions.chunks_exact(FAN).map(Fan::new).collect()
         });

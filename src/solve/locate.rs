@@ -69,13 +69,8 @@ impl FacetLocator {
         let places = &self.surfaces[surface];
         let (low, high) = (places.cell(low), places.cell(high));
         let mut cells = (low.1..=high.1).flat_map(|y| (low.0..=high.0).map(move |x| (x, y)));
-        let only = |cell| match places.facets_in(cell) {
-            [] => places.facets.first().copied(),
-            [only] => Some(*only),
-            _ => None,
-        };
-        let first = only(cells.next()?)?;
-        cells.all(|cell| only(cell) == Some(first)).then_some(first as usize)
+        let first = places.only_in(cells.next()?)?;
+        cells.all(|cell| places.only_in(cell) == Some(first)).then_some(first as usize)
     }
 
     /// The facet that a ray met at `point`, and the place in the facet's plane; `None` for the back of a
@@ -151,15 +146,22 @@ impl Places {
         &self.facets[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 
-    fn facet_at(&self, p: DVec2, rings: &[Vec<Ring>]) -> Option<usize> {
-        match self.facets_in(self.cell(p)) {
-            [] => self.facets.first().map(|&f| f as usize),
-            [only] => Some(*only as usize),
-            [some @ .., last] => {
-                let found = some.iter().find(|&&f| contains(&rings[f as usize], p));
-                Some(*found.unwrap_or(last) as usize)
-            }
+    /// The facet of a cell that no others share; any of the surface's for one that none touches.
+    fn only_in(&self, cell: (usize, usize)) -> Option<u32> {
+        match self.facets_in(cell) {
+            [] => self.facets.first().copied(),
+            [only] => Some(*only),
+            _ => None,
         }
+    }
+
+    fn facet_at(&self, p: DVec2, rings: &[Vec<Ring>]) -> Option<usize> {
+        let cell = self.cell(p);
+        let facet = self.only_in(cell).or_else(|| {
+            let (last, some) = self.facets_in(cell).split_last()?;
+            Some(*some.iter().find(|&&f| contains(&rings[f as usize], p)).unwrap_or(last))
+        });
+        facet.map(|f| f as usize)
     }
 }
 
@@ -207,20 +209,18 @@ impl Descent {
     }
 
     /// The first element on the way down to `p` for which `is_goal` holds, or the leaf there.
+    #[inline]
     #[must_use]
     pub fn find(&self, p: DVec2, is_goal: impl Fn(u32) -> bool) -> u32 {
         let mut at = 0;
         loop {
             let node = &self.nodes[at as usize];
-            let child = node.children[quadrant(p, node.middle)];
+            let quadrant = usize::from(p.x >= node.middle.x) + 2 * usize::from(p.y >= node.middle.y);
+            let child = node.children[quadrant];
             if child == NONE || is_goal(at) {
                 return at;
             }
             at = child;
         }
     }
-}
-
-fn quadrant(p: DVec2, middle: DVec2) -> usize {
-    usize::from(p.x >= middle.x) + 2 * usize::from(p.y >= middle.y)
 }

@@ -35,6 +35,7 @@ use direct::{DirectPass, ShotCounts};
 use emitter::{AreaEmitter, Emitter};
 use field::RadiosityField;
 use gather::{GatherCounts, Source, gather};
+use hemisphere::Directions;
 use hot::HotSpots;
 use locate::FacetLocator;
 use patches::{Energy, Patches};
@@ -165,13 +166,14 @@ fn gather_reflected(
     let direct_scale = patches.direct_scale(received);
     let hot = HotSpots::find(patches, facets);
     let receivers = patches.receivers(facets, gather::LEAST_REFERENCE * pass.typical, &hot);
+    let directions = Directions::prepare();
     let mut counts = GatherCounts::default();
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
     let texels = area / pass.indirect_threshold.powi(2);
     let mut run = |round: Round, done: f64| {
         let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
         let hot_spots = hot.emitters(&field, facets);
-        let source = Source { field: &field, hot_spots: &hot_spots };
+        let source = Source { field: &field, hot_spots: &hot_spots, directions: &directions };
         let own = gather(pass, source, &receivers, round, facets);
         tracing::debug!(
             ?round,

@@ -45,8 +45,7 @@ impl Fan {
 
     /// The same directions in a frame with these axes.
     #[inline(always)]
-    #[must_use]
-    pub fn turned(&self, axes: [Vec3A; 3]) -> Self {
+    fn turned(&self, axes: [Vec3A; 3]) -> Self {
         let mut turned = *self;
         for i in 0..FAN {
             let (x, y, z) = (self.x[i], self.y[i], self.z[i]);

@@ -58,7 +58,7 @@ impl pulp::NullaryFnOnce for Filter<'_> {
     #[inline(always)]
     fn call(self) {
         for &t in self.candidates {
-            if self.shaft.touches_inline(&self.triangles[t as usize]) {
+            if self.shaft.touches(&self.triangles[t as usize]) {
                 self.out.push(t);
             }
         }
@@ -101,13 +101,9 @@ impl Shaft {
     }
 
     /// Whether a triangle reaches into the shaft.
+    #[inline(always)]
     #[must_use]
     pub fn touches(&self, triangle: &[DVec3; 3]) -> bool {
-        self.touches_inline(triangle)
-    }
-
-    #[inline(always)]
-    fn touches_inline(&self, triangle: &[DVec3; 3]) -> bool {
         // Planes that cut the triangle, as bits: the first 64. Without the others it reaches in at least as often.
         let mut cutting = 0_u64;
         let mut is_inside = [true; 3];
