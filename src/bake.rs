@@ -17,7 +17,7 @@ use crate::scene::{ImportOptions, Scene};
 use crate::solve::{Problem, Solution, solve};
 use crate::surface::{Geometry, Surface, build_surfaces};
 use crate::trace::Tracer;
-use crate::unwrap::{Atlas, UnwrapOptions, unwrap};
+use crate::unwrap::{Atlas, UnwrapOptions, unwrap, whole};
 
 mod account;
 
@@ -131,7 +131,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
 
     enter(&mut recorder, Stage::Unwrap)?;
     let unwrapping = UnwrapOptions { resolution: options.resolution, padding: options.padding };
-    let atlas = unwrap(&surfaces, &unwrapping)?;
+    let atlas = unwrap(&surfaces, &whole(&surfaces), &unwrapping)?;
 
     enter(&mut recorder, Stage::Raster)?;
     let (lightmap, texels) = rasterize(&RasterInput {

@@ -6,7 +6,7 @@ use cobake::geom::{Frame, polygon};
 use cobake::options::Resolution;
 use cobake::raster::{SitePosition, TexelSite, sites};
 use cobake::surface::{Region, Surface};
-use cobake::unwrap::{Atlas, UnwrapError, UnwrapOptions, unwrap};
+use cobake::unwrap::{Atlas, UnwrapError, UnwrapOptions, whole};
 use glam::{DVec2, DVec3};
 
 /// Texel coordinates are sums of few f64 of at most 2^14.
@@ -96,6 +96,11 @@ fn furniture(count: usize, seed: u64) -> Vec<Surface> {
         .collect()
 }
 
+/// One chart a surface.
+fn unwrap(surfaces: &[Surface], options: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
+    cobake::unwrap::unwrap(surfaces, &whole(surfaces), options)
+}
+
 fn at_size(side: u32) -> UnwrapOptions {
     UnwrapOptions { resolution: Resolution::Size(side), padding: None }
 }
@@ -128,7 +133,7 @@ fn touched(p: DVec2) -> impl Iterator<Item = (i64, i64)> {
 }
 
 fn owners(sites: &[TexelSite]) -> BTreeMap<(i64, i64), u32> {
-    let map: BTreeMap<_, _> = sites.iter().map(|s| ((i64::from(s.x), i64::from(s.y)), s.surface)).collect();
+    let map: BTreeMap<_, _> = sites.iter().map(|s| ((i64::from(s.x), i64::from(s.y)), s.chart)).collect();
     assert_eq!(map.len(), sites.len(), "no texel has two sites");
     map
 }
@@ -240,7 +245,7 @@ fn sites_lie_inside_their_region_as_near_as_can_be() {
     let atlas = unwrap(&surfaces, &at_size(300)).unwrap();
     let (mut centred, mut moved) = (0, 0);
     for site in sites(&surfaces, &atlas, &all_open) {
-        let (surface, chart) = (&surfaces[site.surface as usize], &atlas.charts[site.surface as usize]);
+        let (surface, chart) = (&surfaces[site.chart as usize], &atlas.charts[site.chart as usize]);
         let region = &surface.regions[site.region as usize];
         assert!(polygon::contains(&region.rings, site.point), "{site:?}");
         let centre = DVec2::new(f64::from(site.x), f64::from(site.y)) + 0.5;
@@ -268,7 +273,7 @@ fn buried_regions_give_way_to_open_ones() {
     let resolution = Resolution::TexelsPerMetre(10.25);
     let floors = [floor];
     let atlas = unwrap(&floors, &UnwrapOptions { resolution, padding: None }).unwrap();
-    let chart = atlas.charts[0];
+    let chart = &atlas.charts[0];
     let mut counts = [0; 3];
     for site in sites(&floors, &atlas, &|_, region| region == 0) {
         let centre = DVec2::new(f64::from(site.x), f64::from(site.y)) + 0.5;
@@ -317,6 +322,6 @@ fn degenerate_input_gets_a_chart() {
     assert_eq!(atlas.charts.len(), odd.len());
     assert!(atlas.charts.iter().all(|c| c.texel_from_plane.inverse().is_finite()));
     let sites = sites(&odd, &atlas, &all_open);
-    assert!((0..3).all(|k| sites.iter().any(|s| s.surface == k)));
-    assert!(sites.iter().all(|s| s.surface < 3 && s.point.is_finite()));
+    assert!((0..3).all(|k| sites.iter().any(|s| s.chart == k)));
+    assert!(sites.iter().all(|s| s.chart < 3 && s.point.is_finite()));
 }

@@ -55,7 +55,7 @@ fn lightmap_of(glb: &[u8]) -> Lightmap {
 /// What the lightmap holds between the texel centres around plane point `p`.
 fn lookup(result: &BakeResult, surface: usize, p: DVec2) -> Vec3 {
     let Lightmap { width, height, texels } = &result.lightmap;
-    let at = result.atlas.charts[surface].texel(p) - 0.5;
+    let at = result.atlas.chart_at(surface, p).unwrap().texel(p) - 0.5;
     let (low, fraction) = (at.floor(), at.fract().as_vec2());
     let texel = |x: f64, y: f64| {
         let clamp = |v: f64, side: u32| v.clamp(0.0, f64::from(side - 1)) as usize;

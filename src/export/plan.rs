@@ -130,7 +130,7 @@ pub(super) fn primitive_materials(primitive: &Object) -> Vec<usize> {
 
 /// Turns the surfaces' lists of triangles round.
 fn surface_of(baked: &Baked) -> Result<Vec<Option<usize>>, ExportError> {
-    if baked.atlas.charts.len() != baked.surfaces.len() {
+    if (0..baked.surfaces.len()).any(|surface| baked.atlas.charts_of(surface).is_empty()) {
         return Err(ExportError::Mismatch { what: "charts" });
     }
     let mut surface_of = vec![None; baked.scene.triangles.len()];

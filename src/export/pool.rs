@@ -29,10 +29,9 @@ pub(super) struct Pool {
 
 /// Where `world` lies in the page of `surface`'s chart: texture coordinates, origin top left.
 pub(super) fn chart_coordinates(baked: &Baked, surface: usize, world: DVec3) -> [f32; 2] {
-    let (Some(surface), Some(chart)) = (baked.surfaces.get(surface), baked.atlas.charts.get(surface)) else {
-        return [0.0; 2];
-    };
-    let texel = chart.texel(surface.frame.project(world));
+    let Some(point) = baked.surfaces.get(surface).map(|s| s.frame.project(world)) else { return [0.0; 2] };
+    let Some(chart) = baked.atlas.chart_at(surface, point) else { return [0.0; 2] };
+    let texel = chart.texel(point);
     let side = |length: u32| f64::from(length.max(1));
     let at = [texel.x / side(baked.atlas.width), texel.y / side(baked.atlas.height)];
     at.map(|c| if c.is_finite() { c as f32 } else { 0.0 })

@@ -11,8 +11,10 @@ use std::ops::Range;
 use glam::DVec2;
 use rayon::prelude::*;
 
+use crate::geom::Ring;
 use crate::geom::polygon::{nearest_on_segment, orient};
 use crate::surface::Surface;
+use crate::unwrap::clip;
 use crate::unwrap::footprint::{Span, spans};
 use crate::unwrap::{Atlas, Chart};
 
@@ -33,9 +35,9 @@ pub struct TexelSite {
     pub x: u32,
     /// Row.
     pub y: u32,
-    /// Index into the surfaces.
-    pub surface: u32,
-    /// Index into [`Surface::regions`].
+    /// Index into [`Atlas::charts`].
+    pub chart: u32,
+    /// Index into the surface's [`regions`](Surface::regions).
     pub region: u32,
     /// A point inside that region, plane coordinates, metres.
     pub point: DVec2,
@@ -57,18 +59,17 @@ pub enum SitePosition {
 /// The sites of all texels that bilinear lookups inside the charts touch.
 ///
 /// `open_region` tells, for a surface's and a region's index, whether the region can be seen.
-/// The sites come surface by surface, within a surface row by row, whatever the number of
-/// threads. No two have the same texel. What lies outside the page is left out, as are surfaces
-/// without a chart or without triangles.
+/// The sites come chart by chart, within a chart row by row, whatever the number of threads. No
+/// two have the same texel. What lies outside the page is left out, as are charts without triangles.
 pub fn sites(
     surfaces: &[Surface],
     atlas: &Atlas,
     open_region: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Vec<TexelSite> {
-    let prepared: Vec<_> = surfaces
+    let prepared: Vec<_> = atlas
+        .charts
         .par_iter()
-        .zip(&atlas.charts)
-        .map(|(surface, chart)| prepare(surface, chart, (atlas.width, atlas.height)))
+        .map(|chart| prepare(&surfaces[chart.surface], chart, (atlas.width, atlas.height)))
         .collect();
     let tasks: Vec<(usize, Range<i64>)> = prepared
         .iter()
@@ -77,7 +78,10 @@ pub fn sites(
         .collect();
     let found: Vec<Vec<TexelSite>> = tasks
         .into_par_iter()
-        .map(|(index, rows)| band_sites(&prepared[index], index, rows, &|region| open_region(index, region)))
+        .map(|(index, rows)| {
+            let surface = atlas.charts[index].surface;
+            band_sites(&prepared[index], index, rows, &|region| open_region(surface, region))
+        })
         .collect();
     let mut sites = Vec::with_capacity(found.iter().map(Vec::len).sum());
     found.into_iter().for_each(|band| sites.extend(band));
@@ -120,7 +124,8 @@ fn prepare(surface: &Surface, chart: &Chart, size: (u32, u32)) -> TexelChart {
     let mut triangles = Vec::new();
     for (region, r) in surface.regions.iter().enumerate() {
         let outer = boundary_edges(&r.triangles);
-        triangles.extend(r.triangles.iter().zip(outer).map(|(&t, outer)| {
+        let parts = r.triangles.iter().zip(outer).flat_map(|(&t, outer)| part_of(t, outer, &chart.outline));
+        triangles.extend(parts.map(|(t, outer)| {
             let [a, b, c] = t.map(|p| chart.texel(p));
             if orient(a, b, c) >= 0.0 {
                 TexelTriangle { region: region as u32, corners: [a, b, c], outer }
@@ -140,6 +145,24 @@ fn prepare(surface: &Surface, chart: &Chart, size: (u32, u32)) -> TexelChart {
     let is_empty = min.0 >= max.0 || min.1 >= max.1;
     let window = if is_empty { Window { min: (0, 0), max: (0, 0) } } else { Window { min, max } };
     TexelChart { triangles, window, plane_from_texel: chart.texel_from_plane.inverse() }
+}
+
+/// What of a triangle with these outer edges lies in a chart's outline, as triangles with theirs. A cut is none.
+fn part_of(triangle: [DVec2; 3], outer: [bool; 3], outline: &Ring) -> Vec<([DVec2; 3], [bool; 3])> {
+    let ring = clip(triangle, outline);
+    if ring == triangle {
+        return vec![(triangle, outer)];
+    }
+    let is_outer = |a: DVec2, b: DVec2| {
+        let middle = 0.5 * (a + b);
+        let near = |i: usize| {
+            let (from, to) = (triangle[i], triangle[(i + 1) % 3]);
+            nearest_on_segment(from, to, middle).distance(middle) < 1e-9 * from.distance(to)
+        };
+        (0..3).any(|i| outer[i] && near(i))
+    };
+    let fan = (2..ring.len()).map(|k| [ring[0], ring[k - 1], ring[k]]);
+    fan.map(|t| (t, [0, 1, 2].map(|i| is_outer(t[i], t[(i + 1) % 3])))).collect()
 }
 
 /// Which edges belong to one triangle only; a T-junction's edges count as such, which is harmless.
@@ -172,7 +195,7 @@ struct Band<'a> {
 
 fn band_sites(
     chart: &TexelChart,
-    surface: usize,
+    index: usize,
     rows: Range<i64>,
     is_open: &dyn Fn(usize) -> bool,
 ) -> Vec<TexelSite> {
@@ -205,7 +228,7 @@ fn band_sites(
         sites.push(TexelSite {
             x: (chart.window.min.0 + (k % width) as i64) as u32,
             y: (rows.start + (k / width) as i64) as u32,
-            surface: surface as u32,
+            chart: index as u32,
             region: triangle.region,
             point: chart.plane_from_texel.transform_point2(inside(triangle, cell.point)),
             position,
@@ -322,12 +345,12 @@ fn keep_one_per_texel(mut sites: Vec<TexelSite>, atlas: &Atlas) -> Vec<TexelSite
     }
     let distance = |s: &TexelSite| {
         let centre = DVec2::new(f64::from(s.x), f64::from(s.y)) + 0.5;
-        atlas.charts.get(s.surface as usize).map_or(f64::INFINITY, |c| c.texel(s.point).distance(centre))
+        atlas.charts.get(s.chart as usize).map_or(f64::INFINITY, |c| c.texel(s.point).distance(centre))
     };
     sites.sort_by(|a, b| {
-        index(a).cmp(&index(b)).then(distance(a).total_cmp(&distance(b))).then(a.surface.cmp(&b.surface))
+        index(a).cmp(&index(b)).then(distance(a).total_cmp(&distance(b))).then(a.chart.cmp(&b.chart))
     });
     sites.dedup_by_key(|s| index(s));
-    sites.sort_by_key(|s| (s.surface, s.y, s.x));
+    sites.sort_by_key(|s| (s.chart, s.y, s.x));
     sites
 }

@@ -26,7 +26,7 @@ use crate::solve::emitter::{Effort, Emitter};
 use crate::solve::umbra::Occluders;
 use crate::surface::{Region, Surface};
 use crate::trace::Tracer;
-use crate::unwrap::Atlas;
+use crate::unwrap::{Atlas, Chart};
 use buried::{Outlook, outlook};
 use cover::{Cover, take_after_neighbours};
 pub use coverage::{SitePosition, TexelSite, sites};
@@ -89,14 +89,15 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
     let buried = buried_regions(input);
     let is_open = |surface: usize, region: usize| !buried[surface][region];
     let sites = sites(input.surfaces, input.atlas, &is_open);
-    let mut of_surface: Vec<Vec<usize>> = vec![Vec::new(); input.surfaces.len()];
+    let mut of_chart: Vec<Vec<usize>> = vec![Vec::new(); input.atlas.charts.len()];
     for (index, site) in sites.iter().enumerate() {
-        of_surface[site.surface as usize].push(index);
+        of_chart[site.chart as usize].push(index);
     }
-    let lit: Vec<(Vec<LitTexel>, TexelWays, Effort)> = of_surface
+    let locators: Vec<TriangleLocator> = input.mesh.surfaces.par_iter().map(TriangleLocator::new).collect();
+    let lit: Vec<(Vec<LitTexel>, TexelWays, Effort)> = of_chart
         .par_iter()
-        .enumerate()
-        .map(|(surface, indices)| surface_texels(input, surface, indices, &sites))
+        .zip(&input.atlas.charts)
+        .map(|(indices, chart)| chart_texels(input, chart, &locators[chart.surface], (indices, &sites)))
         .collect();
     let size = (input.atlas.width, input.atlas.height);
     let count = size.0 as usize * size.1 as usize;
@@ -157,16 +158,17 @@ fn buried_regions(input: &RasterInput) -> Vec<Vec<bool>> {
         .collect()
 }
 
-/// The finished values of one surface's texels, in `direct`.
-fn surface_texels(
+/// The finished values of one chart's texels, in `direct`.
+fn chart_texels(
     input: &RasterInput,
-    surface: usize,
-    indices: &[usize],
-    sites: &[TexelSite],
+    chart: &Chart,
+    locator: &TriangleLocator,
+    (indices, sites): (&[usize], &[TexelSite]),
 ) -> (Vec<LitTexel>, TexelWays, Effort) {
+    let surface = chart.surface;
     let mut texels: Vec<LitTexel> =
         indices.iter().map(|&index| LitTexel::new(index, &sites[index])).collect();
-    let step = texel_steps(&input.atlas.charts[surface]);
+    let step = texel_steps(chart);
     let cover = Cover { tracer: input.tracer, surface: &input.surfaces[surface], step };
     cover.uncover(&mut texels);
     let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
@@ -177,9 +179,8 @@ fn surface_texels(
             emitters: input.emitters,
             typical: input.typical,
         };
-        (ways, effort) = light.shine(&input.surfaces[surface], &input.atlas.charts[surface], &mut texels);
+        (ways, effort) = light.shine(&input.surfaces[surface], chart, &mut texels);
     }
-    let locator = TriangleLocator::new(&input.mesh.surfaces[surface]);
     for texel in &mut texels {
         let (direct, indirect) = locator.light_at(texel.point, texel.region);
         texel.indirect = if input.options.direct == Direct::Mesh { direct + indirect } else { indirect };

@@ -139,7 +139,7 @@ fn least_page(shapes: &[Shape], texels_per_metre: f64, padding: u32) -> Option<(
     best = narrow(best, below, u32::MAX, |steps| attempt(&Skyline, steps));
     #[cfg(feature = "xatlas")]
     if let Some(packer) = super::xatlas::Nesting::worthwhile(shapes, best.0 * SIDE_STEP) {
-        let area: f64 = shapes.iter().map(|s| s.area).sum();
+        let area: f64 = shapes.iter().map(weighed_area).sum();
         let floor = in_steps((area.sqrt() * texels_per_metre).max(f64::from(longest)));
         best = narrow(best, floor.saturating_sub(1), XATLAS_EFFORT.packs, |steps| attempt(&packer, steps));
     }
@@ -225,6 +225,11 @@ fn keeps_apart(charts: &[SizedShape<'_>], places: &[Place], page: Page) -> bool 
     })
 }
 
+/// The texels that a shape takes up at one texel a metre.
+fn weighed_area(shape: &Shape) -> f64 {
+    shape.area * shape.weight.element_product()
+}
+
 /// Texels that a chart's bounding rectangle takes up with its padding.
 fn texels_of(chart: &SizedShape<'_>, padding: u32) -> f64 {
     let side = |texels: u32| f64::from(texels + 1 + 2 * padding);
@@ -251,8 +256,8 @@ fn density_at_share(shapes: &[Shape], page: Page, share: f64) -> f64 {
 /// longer than it.
 fn density_bound(shapes: &[Shape], page: Page) -> f64 {
     let side = f64::from(page.side);
-    let area: f64 = shapes.iter().map(|s| s.area).sum();
-    let longest = shapes.iter().map(|s| s.extent.max_element()).fold(0.0, f64::max);
+    let area: f64 = shapes.iter().map(weighed_area).sum();
+    let longest = shapes.iter().map(|s| (s.extent * s.weight).max_element()).fold(0.0, f64::max);
     let bound = (side / longest).min(side / area.sqrt());
     // Only points: any density will do.
     if bound.is_finite() { bound } else { 1.0 }

@@ -57,11 +57,12 @@ pub(super) trait Packer {
 impl<'a> SizedShape<'a> {
     /// `shape` at a density, rounded to whole texels; `None` if it is too long for any page.
     pub(super) fn new(shape: &'a Shape, texels_per_metre: f64) -> Option<Self> {
-        let side = |metres: f64| {
-            let texels = (metres * texels_per_metre).round().max(1.0);
+        let side = |metres: f64, weight: f64| {
+            let texels = (metres * weight * texels_per_metre).round().max(1.0);
             (texels < f64::from(super::density::LARGEST_SIDE)).then_some(texels as u32)
         };
-        Some(Self { shape, width: side(shape.extent.x)?, height: side(shape.extent.y)? })
+        let (extent, weight) = (shape.extent, shape.weight);
+        Some(Self { shape, width: side(extent.x, weight.x)?, height: side(extent.y, weight.y)? })
     }
 
     /// Texels per metre along each of the frame's axes.
@@ -79,6 +80,6 @@ impl<'a> SizedShape<'a> {
         };
         let corner = DVec2::new(f64::from(place.x), f64::from(place.y)) + 0.5;
         let texel_from_plane = DAffine2::from_mat2_translation(matrix, corner - matrix * self.shape.corner);
-        Chart { texel_from_plane }
+        Chart { surface: self.shape.surface, outline: self.shape.outline.clone(), texel_from_plane }
     }
 }

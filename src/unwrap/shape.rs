@@ -2,35 +2,58 @@
 
 use glam::DVec2;
 
+use super::part::{Part, clip};
+use crate::geom::Ring;
 use crate::geom::polygon::orient;
 use crate::surface::Surface;
 
-/// A surface's outline in its own plane, metres.
+/// The outline of a surface's part in the surface's plane, metres.
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
     /// The least corner of the bounding rectangle.
     pub(super) corner: DVec2,
     /// The bounding rectangle's sides.
     pub(super) extent: DVec2,
-    /// The regions' triangles; together the whole surface.
+    /// What of the regions' triangles lies in the part; together all of it.
     pub(super) triangles: Vec<[DVec2; 3]>,
     /// The area of the triangles, square metres.
     pub(super) area: f64,
+    /// How much denser than others its texels lie along the frame's axes.
+    pub(super) weight: DVec2,
+    /// Index of the surface.
+    pub(super) surface: usize,
+    /// The part's outline.
+    pub(super) outline: Ring,
 }
 
 impl Shape {
-    /// The shape of a surface. One that has no finite extent becomes a point, which gets a chart of one texel.
-    pub(super) fn of(surface: &Surface) -> Self {
-        let triangles: Vec<_> = surface.regions.iter().flat_map(|r| r.triangles.iter().copied()).collect();
-        let corners = surface.rings.iter().flatten().chain(triangles.iter().flatten());
+    /// The shape of a part. One that has no finite extent becomes a point, which gets a chart of one texel.
+    pub(super) fn of(part: &Part, surface: &Surface) -> Self {
+        let whole = surface.regions.iter().flat_map(|r| r.triangles.iter().copied());
+        let triangles: Vec<[DVec2; 3]> = whole
+            .flat_map(|t| {
+                let ring = clip(t, &part.outline);
+                (2..ring.len()).map(move |k| [ring[0], ring[k - 1], ring[k]]).collect::<Vec<_>>()
+            })
+            .collect();
+        let corners = triangles.iter().flatten();
         let (low, high) =
             corners.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
         let area = triangles.iter().map(|t| orient(t[0], t[1], t[2]).abs() / 2.0).sum();
         let extent = high - low;
+        let point = Self {
+            corner: DVec2::ZERO,
+            extent: DVec2::ZERO,
+            triangles: Vec::new(),
+            area: 0.0,
+            weight: part.weight,
+            surface: part.surface,
+            outline: part.outline.clone(),
+        };
         if extent.is_finite() && extent.cmpge(DVec2::ZERO).all() {
-            Self { corner: low, extent, triangles, area }
+            Self { corner: low, extent, triangles, area, ..point }
         } else {
-            Self { corner: DVec2::ZERO, extent: DVec2::ZERO, triangles: Vec::new(), area: 0.0 }
+            point
         }
     }
 

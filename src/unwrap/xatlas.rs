@@ -53,8 +53,9 @@ impl Nesting {
     /// The packer, where there is room for nesting and the search ends in reasonable time.
     pub(super) fn worthwhile(shapes: &[Shape], side: u32) -> Option<Self> {
         let work = (shapes.len() as u64).saturating_mul(u64::from(side) * u64::from(side));
-        let area: f64 = shapes.iter().map(|s| s.area).sum();
-        let bounds: f64 = shapes.iter().map(|s| s.extent.x * s.extent.y).sum();
+        let weighed = |s: &Shape, area: f64| area * s.weight.element_product();
+        let area: f64 = shapes.iter().map(|s| weighed(s, s.area)).sum();
+        let bounds: f64 = shapes.iter().map(|s| weighed(s, s.extent.element_product())).sum();
         (area < (1.0 - LEAST_WASTE) * bounds && work <= MOST_WORK).then_some(Self(()))
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use cobake::export::{Baked, encode_png};
 use cobake::geom::Frame;
+use cobake::geom::polygon::rectangle;
 use cobake::options::BakeOptions;
 use cobake::raster::Lightmap;
 use cobake::retriangulate::{MeshVertex, RadiosityMesh, SurfaceMesh};
@@ -192,6 +193,8 @@ impl Results {
             let scale = (cell - 2.0) / (high - low).max_element();
             let origin = DVec2::new(index as f64 % columns, (index as f64 / columns).floor()) * cell + 1.0;
             Chart {
+                surface: index,
+                outline: rectangle(low, high).to_vec(),
                 texel_from_plane: DAffine2::from_mat2_translation(
                     DMat2::IDENTITY * scale,
                     origin - low * scale,

@@ -197,7 +197,7 @@ impl Baked {
     pub(crate) fn on(&self, surface: usize, point: DVec3) -> f64 {
         let p = self.result.surfaces[surface].frame.project(self.root.transform_point3(point));
         let lightmap = &self.result.lightmap;
-        let at = self.result.atlas.charts[surface].texel(p) - 0.5;
+        let at = self.result.atlas.chart_at(surface, p).unwrap().texel(p) - 0.5;
         let (low, fraction) = (at.floor(), at.fract().as_vec2());
         let texel = |x: f64, y: f64| {
             let clamp = |v: f64, side: u32| v.clamp(0.0, f64::from(side - 1)) as usize;
