@@ -4,12 +4,13 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use crate::density::{DensityOptions, apportion};
 use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
 use crate::export::{Baked, encode, lightmap_bytes};
-use crate::options::{BakeOptions, Direct, Resolution};
+use crate::options::{BakeOptions, DensityPolicy, Direct, Resolution};
 use crate::progress::{Progress, Stage};
-use crate::raster::{Lightmap, RasterInput, rasterize};
+use crate::raster::{Lighting, Lightmap, RasterInput, rasterize};
 use crate::report::{Recorder, Report};
 use crate::retriangulate::RadiosityMesh;
 use crate::retriangulate::mesh::radiosity_mesh;
@@ -130,13 +131,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     account::warn_of_dropped(dropped, &mut recorder);
 
     enter(&mut recorder, Stage::Unwrap)?;
-    let unwrapping = UnwrapOptions { resolution: options.resolution, padding: options.padding };
-    let atlas = unwrap(&surfaces, &whole(&surfaces), &unwrapping)?;
-
-    enter(&mut recorder, Stage::Raster)?;
-    let (lightmap, texels) = rasterize(&RasterInput {
+    let raster_input = RasterInput {
         surfaces: &surfaces,
-        atlas: &atlas,
         mesh: &mesh,
         tracer: &tracer,
         occluders: &solution.occluders,
@@ -144,7 +140,17 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         typical: solution.typical,
         appearance: &appearance,
         options,
-    });
+    };
+    let lighting = Lighting::new(&raster_input);
+    let unwrapping = UnwrapOptions { resolution: options.resolution, padding: options.padding };
+    let parts = match options.density {
+        DensityPolicy::Light => apportion(&lighting, scale.density(options)).parts,
+        DensityPolicy::Uniform => whole(&surfaces),
+    };
+    let atlas = unwrap(&surfaces, &parts, &unwrapping)?;
+
+    enter(&mut recorder, Stage::Raster)?;
+    let (lightmap, texels) = rasterize(&lighting, &atlas);
 
     enter(&mut recorder, Stage::Export)?;
     let glb = encode(&Baked {
@@ -191,9 +197,27 @@ struct Scale {
     threshold: f64,
     indirect_threshold: f64,
     texel: f64,
+    /// The page's side.
+    side: f64,
 }
 
+/// The share of a page that charts and their padding fill.
+const FILLED: f64 = 0.95;
+
 impl Scale {
+    fn density(&self, options: &BakeOptions) -> DensityOptions {
+        let side = match options.resolution {
+            Resolution::Size(side) => f64::from(side),
+            Resolution::TexelsPerMetre(density) => density * self.side,
+        };
+        DensityOptions {
+            texels: FILLED * side * side,
+            longest: side - 1.0,
+            padding: options.padding.unwrap_or(1),
+            uniform_texel: self.texel,
+        }
+    }
+
     fn of(surfaces: &[Surface], options: &BakeOptions) -> Self {
         let area: f64 = surfaces.iter().map(|s| s.area).sum();
         let texel = match options.resolution {
@@ -206,6 +230,12 @@ impl Scale {
             Direct::Texel => TEXELS_AN_ELEMENT * texel,
         });
         let indirect_threshold = options.subdivision_threshold.unwrap_or(texel);
-        Self { patch_size: patch_size.max(threshold), threshold, indirect_threshold, texel }
+        Self {
+            patch_size: patch_size.max(threshold),
+            threshold,
+            indirect_threshold,
+            texel,
+            side: (area / UTILISATION).sqrt(),
+        }
     }
 }

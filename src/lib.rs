@@ -2,6 +2,7 @@
 mod bake;
 pub mod cob;
 pub mod compare;
+pub mod density;
 pub mod element;
 pub mod error;
 pub mod export;

@@ -76,6 +76,18 @@ impl Default for Resolution {
     }
 }
 
+/// Where texels are dense.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum DensityPolicy {
+    /// Where the light needs them: surfaces are cut into charts whose texels leave least error.
+    #[default]
+    Light,
+    /// Everywhere alike, a chart a surface.
+    Uniform,
+}
+
 /// The height of the prism above an element in which occluders count as close.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -99,6 +111,8 @@ impl Default for CobHeight {
 pub struct BakeOptions {
     /// How fine the lightmap is. Default: a page of 512 texels a side.
     pub resolution: Resolution,
+    /// Where texels are dense. Default: [`DensityPolicy::Light`].
+    pub density: DensityPolicy,
     /// Worker threads, `[0, 1024]`; `0` takes one per core. The result does not depend on it. Default: `0`.
     pub threads: usize,
     /// Which elements are split. Default: [`Refine::CobGradient`].
@@ -151,6 +165,7 @@ impl Default for BakeOptions {
     fn default() -> Self {
         Self {
             resolution: Resolution::default(),
+            density: DensityPolicy::default(),
             threads: 0,
             refine: Refine::default(),
             direct: Direct::default(),

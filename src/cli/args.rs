@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use cobake::options::{BakeOptions, CobHeight, Direct, Quantity, Refine, Resolution, Toggle, Topology};
+use cobake::options::{
+    BakeOptions, CobHeight, DensityPolicy, Direct, Quantity, Refine, Resolution, Toggle, Topology,
+};
 
 use super::compare_args::CompareArgs;
 
@@ -66,6 +68,10 @@ pub(crate) struct BakeArgs {
     /// Texels per metre of surface, above 0; the lightmap's side follows
     #[arg(long, value_name = "DENSITY", conflicts_with = "size", allow_negative_numbers = true, help_heading = LIGHTMAP)]
     texels_per_metre: Option<f64>,
+
+    /// Where texels are dense
+    #[arg(long, value_enum, default_value_t = DensityWord::Light, help_heading = LIGHTMAP)]
+    density: DensityWord,
 
     /// Free texels around what a lookup in a chart touches, 1 to 16 [default: 1, or 0 where charts do not fit otherwise]
     #[arg(long, value_name = "TEXELS", help_heading = LIGHTMAP)]
@@ -146,6 +152,14 @@ enum RefineWord {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+enum DensityWord {
+    /// Where the light needs them: surfaces are cut into charts whose texels leave least error
+    Light,
+    /// Everywhere alike, a chart a surface: the baseline to compare with
+    Uniform,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum DirectWord {
     /// Interpolated from the mesh's vertices, as the indirect light is
     Mesh,
@@ -179,6 +193,15 @@ impl From<RefineWord> for Refine {
             RefineWord::CobGradient => Self::CobGradient,
             RefineWord::Uniform => Self::Uniform,
             RefineWord::None => Self::None,
+        }
+    }
+}
+
+impl From<DensityWord> for DensityPolicy {
+    fn from(word: DensityWord) -> Self {
+        match word {
+            DensityWord::Light => Self::Light,
+            DensityWord::Uniform => Self::Uniform,
         }
     }
 }
@@ -218,6 +241,7 @@ impl From<&BakeArgs> for BakeOptions {
         let mut options = Self::default();
         options.resolution =
             args.texels_per_metre.map_or(Resolution::Size(args.size), Resolution::TexelsPerMetre);
+        options.density = args.density.into();
         options.threads = args.threads;
         options.refine = args.refine.into();
         options.direct = args.direct.into();

@@ -88,6 +88,18 @@ pub fn sites(
     keep_one_per_texel(sites, atlas)
 }
 
+/// The sites of one chart alone in a page of `size` texels. See [`sites`].
+pub(super) fn chart_sites(
+    surface: &Surface,
+    chart: &Chart,
+    size: (u32, u32),
+    is_open: &dyn Fn(usize) -> bool,
+) -> Vec<TexelSite> {
+    let prepared = prepare(surface, chart, size);
+    let rows = prepared.window.min.1..prepared.window.max.1;
+    band_sites(&prepared, 0, rows, is_open)
+}
+
 /// A chart's triangles in texel space.
 struct TexelChart {
     triangles: Vec<TexelTriangle>,

@@ -76,6 +76,17 @@ pub(super) struct LitTexel {
     /// What arrives from the emitter at hand, and whether its shadow's edge is near.
     now: DVec3,
     is_at_edge: bool,
+    /// Whether some emitter's shadow may fall between here and the next texel.
+    pub is_crossed: bool,
+}
+
+/// What is done where a shadow's edge crosses a texel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Edges {
+    /// Texels are fitted to several points.
+    Fitted,
+    /// Each texel has the light at its own point.
+    Once,
 }
 
 impl LitTexel {
@@ -92,6 +103,7 @@ impl LitTexel {
             covering: Covering::Seen,
             now: DVec3::ZERO,
             is_at_edge: false,
+            is_crossed: false,
         }
     }
 }
@@ -106,6 +118,8 @@ pub(super) struct DirectLight<'a> {
     pub emitters: &'a [Emitter],
     /// Mean luminance of the irradiance in the scene's mesh.
     pub typical: f64,
+    /// What is done at shadows' edges.
+    pub edges: Edges,
 }
 
 impl DirectLight<'_> {
@@ -320,11 +334,12 @@ impl Shining<'_> {
         let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
         for texel in texels.iter_mut() {
             texel.now = self.irradiance(texel.point, Between::Polygons(between), &mut evaluation);
+            texel.is_crossed = true;
             let light = luminance(texel.now);
             (least, most) = (least.min(light), most.max(light));
         }
         let mut samples = Vec::new();
-        let is_bright = most > DIM * self.light.typical;
+        let is_bright = self.light.edges == Edges::Fitted && most > DIM * self.light.typical;
         if is_bright && (texels.len() == 1 || most - least > SMOOTH * most) {
             let outlines = self.outlines_near(texels);
             for texel in texels.iter_mut().filter(|t| t.covering == Covering::Seen) {

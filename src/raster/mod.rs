@@ -16,6 +16,7 @@ mod ways;
 
 use std::f64::consts::PI;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::element::SurfaceAppearance;
@@ -29,9 +30,10 @@ use crate::trace::Tracer;
 use crate::unwrap::{Atlas, Chart};
 use buried::{Outlook, outlook};
 use cover::{Cover, take_after_neighbours};
+use coverage::chart_sites;
 pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
-use direct::{DirectLight, LitTexel, texel_steps};
+use direct::{DirectLight, Edges, LitTexel, texel_steps};
 use locate::TriangleLocator;
 pub use ways::TexelWays;
 
@@ -50,8 +52,6 @@ pub struct Lightmap {
 pub struct RasterInput<'a> {
     /// The surfaces.
     pub surfaces: &'a [Surface],
-    /// Their places in the page.
-    pub atlas: &'a Atlas,
     /// The light on them.
     pub mesh: &'a RadiosityMesh,
     /// The scene's triangles.
@@ -66,6 +66,23 @@ pub struct RasterInput<'a> {
     pub appearance: &'a (dyn SurfaceAppearance + Sync),
     /// The caller's options.
     pub options: &'a BakeOptions,
+}
+
+/// Tells the light on any part of the surfaces.
+pub struct Lighting<'a> {
+    input: &'a RasterInput<'a>,
+    /// For each surface's regions whether nobody sees them.
+    buried: Vec<Vec<bool>>,
+    locators: Vec<TriangleLocator<'a>>,
+}
+
+/// The light at a point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLight {
+    /// Irradiance.
+    pub irradiance: DVec3,
+    /// Whether a shadow may fall between this point and the next.
+    pub is_crossed: bool,
 }
 
 /// What rasterizing took.
@@ -83,23 +100,77 @@ pub struct TexelCounts {
     pub effort: Effort,
 }
 
+impl<'a> Lighting<'a> {
+    /// Sorts the mesh's triangles and finds the regions that nobody sees.
+    #[must_use]
+    pub fn new(input: &'a RasterInput<'a>) -> Self {
+        let locators = input.mesh.surfaces.par_iter().map(TriangleLocator::new).collect();
+        Self { input, buried: buried_regions(input), locators }
+    }
+
+    /// The surfaces.
+    #[must_use]
+    pub fn surfaces(&self) -> &'a [Surface] {
+        self.input.surfaces
+    }
+
+    /// The irradiance at the texel centres of a page of `size` texels that `chart` alone lies in, row by row;
+    /// `None` where nothing of the surface that is seen is near.
+    #[must_use]
+    pub fn at_centres(&self, chart: &Chart, size: (u32, u32)) -> Vec<Option<PointLight>> {
+        let surface = &self.input.surfaces[chart.surface];
+        let sites = chart_sites(surface, chart, size, &|region| !self.buried[chart.surface][region]);
+        let seen = sites.iter().enumerate().filter(|(_, s)| s.position != SitePosition::Buried);
+        let mut texels: Vec<LitTexel> = seen.map(|(index, site)| LitTexel::new(index, site)).collect();
+        if self.input.options.direct == Direct::Texel {
+            self.direct(Edges::Once).shine(surface, chart, &mut texels);
+        }
+        self.add_indirect(chart.surface, &mut texels);
+        let mut light = vec![None; size.0 as usize * size.1 as usize];
+        for texel in &texels {
+            let at = texel.cell[1] as usize * size.0 as usize + texel.cell[0] as usize;
+            let irradiance = texel.direct + texel.indirect;
+            light[at] = Some(PointLight { irradiance, is_crossed: texel.is_crossed });
+        }
+        light
+    }
+
+    fn direct(&self, edges: Edges) -> DirectLight<'a> {
+        DirectLight {
+            tracer: self.input.tracer,
+            occluders: self.input.occluders,
+            emitters: self.input.emitters,
+            typical: self.input.typical,
+            edges,
+        }
+    }
+
+    /// Looks up what the mesh holds.
+    fn add_indirect(&self, surface: usize, texels: &mut [LitTexel]) {
+        for texel in texels {
+            let (direct, indirect) = self.locators[surface].light_at(texel.point, texel.region);
+            texel.indirect =
+                if self.input.options.direct == Direct::Mesh { direct + indirect } else { indirect };
+        }
+    }
+}
+
 /// Computes all texels of the page.
 #[must_use]
-pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
-    let buried = buried_regions(input);
-    let is_open = |surface: usize, region: usize| !buried[surface][region];
-    let sites = sites(input.surfaces, input.atlas, &is_open);
-    let mut of_chart: Vec<Vec<usize>> = vec![Vec::new(); input.atlas.charts.len()];
+pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> (Lightmap, TexelCounts) {
+    let input = lighting.input;
+    let is_open = |surface: usize, region: usize| !lighting.buried[surface][region];
+    let sites = sites(input.surfaces, atlas, &is_open);
+    let mut of_chart: Vec<Vec<usize>> = vec![Vec::new(); atlas.charts.len()];
     for (index, site) in sites.iter().enumerate() {
         of_chart[site.chart as usize].push(index);
     }
-    let locators: Vec<TriangleLocator> = input.mesh.surfaces.par_iter().map(TriangleLocator::new).collect();
     let lit: Vec<(Vec<LitTexel>, TexelWays, Effort)> = of_chart
         .par_iter()
-        .zip(&input.atlas.charts)
-        .map(|(indices, chart)| chart_texels(input, chart, &locators[chart.surface], (indices, &sites)))
+        .zip(&atlas.charts)
+        .map(|(indices, chart)| chart_texels(lighting, chart, (indices, &sites)))
         .collect();
-    let size = (input.atlas.width, input.atlas.height);
+    let size = (atlas.width, atlas.height);
     let count = size.0 as usize * size.1 as usize;
     let (mut texels, mut valid) = (vec![[0.0; 3]; count], vec![false; count]);
     let mut counts = TexelCounts { covered: sites.len() as u64, ..TexelCounts::default() };
@@ -118,7 +189,7 @@ pub fn rasterize(input: &RasterInput) -> (Lightmap, TexelCounts) {
     }
     tracing::debug!(?counts, "texels");
     let before = valid.iter().filter(|&&v| v).count();
-    dilate(&mut texels, &mut valid, size, input.atlas.padding);
+    dilate(&mut texels, &mut valid, size, atlas.padding);
     counts.dilated = (valid.iter().filter(|&&v| v).count() - before) as u64;
     (Lightmap { width: size.0, height: size.1, texels }, counts)
 }
@@ -160,12 +231,11 @@ fn buried_regions(input: &RasterInput) -> Vec<Vec<bool>> {
 
 /// The finished values of one chart's texels, in `direct`.
 fn chart_texels(
-    input: &RasterInput,
+    lighting: &Lighting,
     chart: &Chart,
-    locator: &TriangleLocator,
     (indices, sites): (&[usize], &[TexelSite]),
 ) -> (Vec<LitTexel>, TexelWays, Effort) {
-    let surface = chart.surface;
+    let (input, surface) = (lighting.input, chart.surface);
     let mut texels: Vec<LitTexel> =
         indices.iter().map(|&index| LitTexel::new(index, &sites[index])).collect();
     let step = texel_steps(chart);
@@ -173,18 +243,9 @@ fn chart_texels(
     cover.uncover(&mut texels);
     let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
     if input.options.direct == Direct::Texel {
-        let light = DirectLight {
-            tracer: input.tracer,
-            occluders: input.occluders,
-            emitters: input.emitters,
-            typical: input.typical,
-        };
-        (ways, effort) = light.shine(&input.surfaces[surface], chart, &mut texels);
+        (ways, effort) = lighting.direct(Edges::Fitted).shine(&input.surfaces[surface], chart, &mut texels);
     }
-    for texel in &mut texels {
-        let (direct, indirect) = locator.light_at(texel.point, texel.region);
-        texel.indirect = if input.options.direct == Direct::Mesh { direct + indirect } else { indirect };
-    }
+    lighting.add_indirect(surface, &mut texels);
     take_after_neighbours(&mut texels, |t| &mut t.indirect);
     let half = 0.5 * (step[0].abs() + step[1].abs());
     for texel in &mut texels {

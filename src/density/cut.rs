@@ -1,0 +1,369 @@
+//! Cutting surfaces into parts of one spacing each.
+//!
+//! A part costs its error (squared error times area) and a price for each texel that its chart takes with
+//! the padding. A part is cut in two where that makes it cheaper; whether it does is asked from the
+//! finest cuts upward, since one cut may pay only together with the next.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::survey::Surveys;
+use super::{Cell, DensityOptions, LEVELS, SurfaceSurvey};
+use crate::geom::polygon::{orient, rectangle};
+use crate::surface::Surface;
+use crate::unwrap::{Part, clip};
+
+/// Cuts that are tried along each side of a part, at most.
+const CUTS: usize = 24;
+
+/// Cuts into cuts.
+const DEEPEST: u32 = 24;
+
+/// What a chart costs beside its texels, in texels: the vertices that cutting adds.
+const CHART: f64 = 40.0;
+
+/// Spacings that are tried within a halving.
+const STEPS: usize = 2;
+
+/// Searches for the price that fills the page.
+const TRIES: u32 = 16;
+
+/// All surfaces' parts, together of as many texels as the options allow.
+pub(super) fn cut(surfaces: &[Surface], surveys: &Surveys, options: DensityOptions) -> Vec<Part> {
+    let most = surveys.surfaces.iter().map(total_error).sum::<f64>().max(f64::MIN_POSITIVE);
+    // At a price below the one that will be paid there are more cuts than needed.
+    let finest = 0.004 * surveys.price;
+    let trees: Vec<Tree> =
+        surveys.surfaces.par_iter().map(|survey| Cutter::new(survey, finest, options).tree()).collect();
+    let at_price = |price: f64| -> Vec<Vec<Leaf>> {
+        let of = |(tree, survey): (&Tree, &SurfaceSurvey)| tree.pruned(&Cutter::new(survey, price, options));
+        trees.par_iter().zip(&surveys.surfaces).map(of).collect()
+    };
+    let texels = |leaves: &[Vec<Leaf>]| leaves.iter().flatten().map(|l| l.texels).sum::<f64>();
+    let (mut low, mut high) = ((1e-16 * most).ln(), most.ln());
+    let mut best = None;
+    let mut middle = (0.02 * surveys.price).clamp(1e-16 * most, most).ln();
+    for _ in 0..TRIES {
+        let leaves = at_price(middle.exp());
+        let taken = texels(&leaves);
+        tracing::debug!(price = middle.exp(), taken, "try");
+        // Texels go with about the -0.6th power of the price; a little more is aimed at than is wanted.
+        let towards = middle + 1.7 * (taken / (0.992 * options.texels)).ln();
+        if taken <= options.texels {
+            high = middle;
+            best = Some(leaves);
+            if taken > 0.985 * options.texels {
+                break;
+            }
+        } else {
+            low = middle;
+        }
+        middle = if towards > low && towards < high { towards } else { 0.5 * (low + high) };
+    }
+    let leaves = best.unwrap_or_else(|| at_price(most));
+    tracing::debug!(
+        guess = surveys.price,
+        price = high.exp(),
+        texels = texels(&leaves),
+        nodes = trees.iter().map(Tree::nodes).sum::<usize>(),
+        parts = leaves.iter().map(Vec::len).sum::<usize>(),
+        "cut"
+    );
+    let parts = leaves.into_iter().zip(surfaces).enumerate();
+    parts.flat_map(|(index, (leaves, surface))| parts_of(index, surface, &leaves)).collect()
+}
+
+fn total_error(survey: &SurfaceSurvey) -> f64 {
+    let of = |cell: &Cell| {
+        let energy: f32 = cell.energy.iter().flatten().sum();
+        (cell.max - cell.min).element_product() * f64::from(energy)
+    };
+    survey.cells.iter().map(of).sum()
+}
+
+/// The leaves that hold something of the surface, as parts; the whole where there are none.
+fn parts_of(index: usize, surface: &Surface, leaves: &[Leaf]) -> Vec<Part> {
+    let part = |leaf: &Leaf| Part {
+        surface: index,
+        outline: rectangle(leaf.min, leaf.max).to_vec(),
+        weight: 1.0 / leaf.spacing,
+    };
+    let area = |part: &Part| -> f64 {
+        let triangles = surface.regions.iter().flat_map(|r| &r.triangles);
+        let inside = triangles.map(|&t| clip(t, &part.outline));
+        inside
+            .map(|ring| (2..ring.len()).map(|k| orient(ring[0], ring[k - 1], ring[k]).abs()).sum::<f64>())
+            .sum()
+    };
+    if leaves.len() == 1 {
+        return vec![part(&leaves[0])];
+    }
+    let parts: Vec<Part> = leaves.iter().map(part).filter(|p| area(p) > 0.0).collect();
+    parts
+}
+
+/// A part of a surface that is not cut further.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    min: DVec2,
+    max: DVec2,
+    spacing: DVec2,
+    /// That its chart takes, with padding.
+    texels: f64,
+    /// Error and price.
+    cost: f64,
+}
+
+/// A rectangle and how it may be cut.
+struct Tree {
+    min: DVec2,
+    max: DVec2,
+    sum: Sum,
+    cut: Option<Box<[Tree; 2]>>,
+}
+
+impl Tree {
+    fn nodes(&self) -> usize {
+        1 + self.cut.iter().flat_map(|sides| sides.iter()).map(Self::nodes).sum::<usize>()
+    }
+
+    /// The cheapest leaves that the cuts allow.
+    fn pruned(&self, cutter: &Cutter) -> Vec<Leaf> {
+        let mut leaves = Vec::new();
+        self.prune(cutter, &mut leaves);
+        leaves
+    }
+
+    /// Adds the cheapest leaves and returns what they cost.
+    fn prune(&self, cutter: &Cutter, leaves: &mut Vec<Leaf>) -> f64 {
+        let whole = cutter.leaf((self.min, self.max), &self.sum);
+        let before = leaves.len();
+        let of_sides =
+            self.cut.as_ref().map(|sides| sides.iter().map(|s| s.prune(cutter, leaves)).sum::<f64>());
+        match of_sides {
+            Some(cost) if cost < whole.cost => cost,
+            _ => {
+                leaves.truncate(before);
+                leaves.push(whole);
+                whole.cost
+            }
+        }
+    }
+}
+
+struct Cutter<'a> {
+    survey: &'a SurfaceSurvey,
+    price: f64,
+    options: DensityOptions,
+    /// The spacings that are tried, for either axis, metres.
+    spacings: [[f64; STEPS * LEVELS]; 2],
+}
+
+impl<'a> Cutter<'a> {
+    fn new(survey: &'a SurfaceSurvey, price: f64, options: DensityOptions) -> Self {
+        let of = |base: f64| std::array::from_fn(|step| base * (-(step as f64) / STEPS as f64).exp2());
+        Self { survey, price, options, spacings: survey.base.to_array().map(of) }
+    }
+
+    fn tree(&self) -> Tree {
+        let SurfaceSurvey { min, max, .. } = *self.survey;
+        let cells: Vec<&Cell> = self.survey.cells.iter().collect();
+        self.grow((min, max), &cells, DEEPEST)
+    }
+
+    /// Cuts a rectangle that holds (parts of) `cells` while that may pay.
+    fn grow(&self, (min, max): (DVec2, DVec2), cells: &[&Cell], depth: u32) -> Tree {
+        let mut tree = Tree { min, max, sum: Sum::of(cells, min, max), cut: None };
+        let whole = self.leaf((min, max), &tree.sum);
+        let least = self.price * (CHART + self.chart_texels([1.0; 2]));
+        if depth == 0 || whole.cost <= 2.0 * least {
+            return tree;
+        }
+        let Some((axis, at)) = self.best_cut((min, max), cells, whole.cost + least) else { return tree };
+        let (mut low_max, mut high_min) = (max, min);
+        (low_max[axis], high_min[axis]) = (at, at);
+        let side =
+            |keep: &dyn Fn(&Cell) -> bool| cells.iter().filter(|c| keep(c)).copied().collect::<Vec<_>>();
+        let (low, high) = (side(&|c| c.min[axis] < at), side(&|c| c.max[axis] > at));
+        let low = self.grow((min, low_max), &low, depth - 1);
+        tree.cut = Some(Box::new([low, self.grow((high_min, max), &high, depth - 1)]));
+        tree
+    }
+
+    /// The axis and place of the cut after which the two sides, uncut, cost least; `None` if that is `limit` or more.
+    fn best_cut(&self, (min, max): (DVec2, DVec2), cells: &[&Cell], limit: f64) -> Option<(usize, f64)> {
+        let mut best: Option<(f64, usize, f64)> = None;
+        for axis in 0..2 {
+            let lines = self.lines(axis, (min[axis], max[axis]));
+            if lines.is_empty() {
+                continue;
+            }
+            // What lies between one line and the next, then from either end to each line.
+            let mut edges = vec![min[axis]];
+            edges.extend(&lines);
+            edges.push(max[axis]);
+            let mut slabs = vec![Sum::default(); edges.len() - 1];
+            for cell in cells {
+                let first = edges.partition_point(|&e| e <= cell.min[axis]).max(1) - 1;
+                for (slab, edge) in slabs.iter_mut().zip(edges.windows(2)).skip(first) {
+                    if edge[0] >= cell.max[axis] {
+                        break;
+                    }
+                    let (mut low, mut high) = (min, max);
+                    (low[axis], high[axis]) = (edge[0], edge[1]);
+                    slab.add(cell, low, high);
+                }
+            }
+            let mut below = vec![slabs[0]];
+            for slab in &slabs[1..] {
+                let sum = below[below.len() - 1].and(slab);
+                below.push(sum);
+            }
+            let mut above = Sum::default();
+            for k in (0..lines.len()).rev() {
+                above = slabs[k + 1].and(&above);
+                let (mut low_max, mut high_min) = (max, min);
+                (low_max[axis], high_min[axis]) = (lines[k], lines[k]);
+                let cost =
+                    self.leaf((min, low_max), &below[k]).cost + self.leaf((high_min, max), &above).cost;
+                if cost < best.map_or(limit, |b| b.0) {
+                    best = Some((cost, axis, lines[k]));
+                }
+            }
+        }
+        best.map(|(_, axis, at)| (axis, at))
+    }
+
+    /// Where a stretch may be cut: at the surveyed cells' dyadic edges, as fine as leaves not too many of them.
+    fn lines(&self, axis: usize, (low, high): (f64, f64)) -> Vec<f64> {
+        let (origin, base) = (self.survey.min[axis], self.survey.base[axis]);
+        let mut step = base;
+        while (high - low) / step < 0.5 * CUTS as f64 && step > base * 0.5_f64.powi(LEVELS as i32 - 4) {
+            step *= 0.5;
+        }
+        let step = if (high - low) / step > CUTS as f64 {
+            step * ((high - low) / step / CUTS as f64).ceil()
+        } else {
+            step
+        };
+        let first = ((low - origin) / step + 0.01).floor() as i64 + 1;
+        let last = ((high - origin) / step - 0.01).ceil() as i64 - 1;
+        (first..=last).map(|k| origin + k as f64 * step).collect()
+    }
+
+    /// A rectangle as one part, at its best spacing.
+    fn leaf(&self, (min, max): (DVec2, DVec2), sum: &Sum) -> Leaf {
+        const LAST: usize = STEPS * LEVELS - 1;
+        let none = Leaf { min, max, spacing: max - min, texels: 0.0, cost: 0.0 };
+        let extent = sum.max - sum.min;
+        if !extent.is_finite() || extent.min_element() <= 0.0 {
+            return none;
+        }
+        let error = [0, 1].map(|axis| sum.errors(axis));
+        let texels: [[f64; STEPS * LEVELS]; 2] = [0, 1].map(|axis| {
+            std::array::from_fn(|step| (extent[axis] / self.spacings[axis][step]).round().max(1.0))
+        });
+        // No spacing is wider than the part, none narrower than was looked at (an edge that seemed to run along
+        // an axis may not), and none so narrow that the chart is longer than the page.
+        let first =
+            [0, 1].map(|axis| self.spacings[axis].partition_point(|&s| s > 1.5 * extent[axis]).min(LAST));
+        let last = [0, 1].map(|axis| {
+            let longest = texels[axis].partition_point(|&t| t <= self.options.longest).saturating_sub(1);
+            longest.min(STEPS * sum.levels[axis]).clamp(first[axis], LAST)
+        });
+        let cost = |[x, y]: [usize; 2]| {
+            let chart = self.chart_texels([texels[0][x], texels[1][y]]);
+            error[0][x] + error[1][y] + self.price * (CHART + chart)
+        };
+        let least = |best: (f64, [usize; 2]), step: [usize; 2]| {
+            let cost = cost(step);
+            if cost < best.0 { (cost, step) } else { best }
+        };
+        let mut best = (f64::INFINITY, first);
+        for k in 0..=LAST {
+            best = least(best, [(first[0] + k).min(last[0]), (first[1] + k).min(last[1])]);
+        }
+        for _ in 0..2 {
+            let y = best.1[1];
+            best = (first[0]..=last[0]).fold(best, |best, x| least(best, [x, y]));
+            let x = best.1[0];
+            best = (first[1]..=last[1]).fold(best, |best, y| least(best, [x, y]));
+        }
+        let (cost, step) = best;
+        let count = [texels[0][step[0]], texels[1][step[1]]];
+        Leaf { min, max, spacing: extent / DVec2::from(count), texels: self.chart_texels(count), cost }
+    }
+
+    /// Texels that a chart takes with its padding.
+    fn chart_texels(&self, [width, height]: [f64; 2]) -> f64 {
+        let around = f64::from(1 + 2 * self.options.padding);
+        (width + around) * (height + around)
+    }
+}
+
+/// The error in a rectangle at each spacing.
+#[derive(Clone, Copy, Debug)]
+struct Sum {
+    /// The bounding rectangle of what was summed.
+    min: DVec2,
+    max: DVec2,
+    /// What each halving changes, times area.
+    energy: [[f64; LEVELS]; 2],
+    /// The most halvings that were looked at.
+    levels: [usize; 2],
+}
+
+impl Default for Sum {
+    fn default() -> Self {
+        Self { min: DVec2::INFINITY, max: DVec2::NEG_INFINITY, energy: Default::default(), levels: [0; 2] }
+    }
+}
+
+impl Sum {
+    fn of(cells: &[&Cell], min: DVec2, max: DVec2) -> Self {
+        let mut sum = Self::default();
+        cells.iter().for_each(|cell| sum.add(cell, min, max));
+        sum
+    }
+
+    /// Adds what of a cell lies between `min` and `max`.
+    fn add(&mut self, cell: &Cell, min: DVec2, max: DVec2) {
+        let (low, high) = (cell.min.max(min), cell.max.min(max));
+        // Cells beside the rectangle reach into it by rounding errors.
+        if (high - low).cmple(1e-6 * (cell.max - cell.min)).any() {
+            return;
+        }
+        let area = (high - low).element_product();
+        self.levels = [0, 1].map(|axis| self.levels[axis].max(cell.levels[axis]));
+        self.min = self.min.min(low);
+        self.max = self.max.max(high);
+        for (sum, row) in self.energy.iter_mut().flatten().zip(cell.energy.iter().flatten()) {
+            *sum += area * f64::from(*row);
+        }
+    }
+
+    fn and(&self, other: &Self) -> Self {
+        let mut sum = *self;
+        sum.min = sum.min.min(other.min);
+        sum.max = sum.max.max(other.max);
+        sum.levels = [0, 1].map(|axis| sum.levels[axis].max(other.levels[axis]));
+        for (sum, more) in sum.energy.iter_mut().flatten().zip(other.energy.iter().flatten()) {
+            *sum += more;
+        }
+        sum
+    }
+
+    /// The error along an axis at each of the spacings that are tried: all that finer halvings would change.
+    fn errors(&self, axis: usize) -> [f64; STEPS * LEVELS] {
+        let mut finer = 0.0;
+        let mut errors = [0.0; STEPS * LEVELS];
+        for level in (0..LEVELS).rev() {
+            let before = finer;
+            finer += self.energy[axis][level];
+            // Half way between two halvings lies the geometric mean.
+            errors[STEPS * level] = finer;
+            errors[STEPS * level + 1] = (finer * before.max(0.25 * finer)).sqrt();
+        }
+        errors
+    }
+}

@@ -1,0 +1,88 @@
+//! What finer samples tell that coarser ones did not.
+
+use glam::DVec3;
+
+use crate::raster::PointLight;
+
+/// The mean square of a hat of height 1 over its support.
+const HAT: f64 = 1.0 / 3.0;
+
+/// Light at the nodes of a grid of `cells[0] × cells[1]` cells, row by row.
+pub(super) struct Grid<'a> {
+    pub cells: [usize; 2],
+    pub light: &'a [Option<PointLight>],
+}
+
+impl Grid<'_> {
+    /// Mean squared error of linear interpolation between nodes `2 × step` cells apart along `axis`, told
+    /// from the nodes between them, in the cells from `low` to `high`.
+    pub(super) fn energy(&self, axis: usize, step: usize, low: [usize; 2], high: [usize; 2]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0_u32);
+        let mut middle = step;
+        while middle + step <= self.cells[axis] {
+            if middle + step > low[axis] && middle - step < high[axis] {
+                for across in low[1 - axis]..=high[1 - axis] {
+                    let node = |along: usize| {
+                        let at = if axis == 0 { [along, across] } else { [across, along] };
+                        self.node(at)
+                    };
+                    if let (Some(a), Some(b), Some(c)) =
+                        (node(middle - step), node(middle), node(middle + step))
+                    {
+                        let surplus = b - 0.5 * (a + c);
+                        sum += surplus.length_squared() / 3.0;
+                        count += 1;
+                    }
+                }
+            }
+            middle += 2 * step;
+        }
+        if count == 0 { 0.0 } else { HAT * sum / f64::from(count) }
+    }
+
+    /// Whether the surface is seen anywhere in the cells, and whether a shadow may cross them.
+    pub(super) fn holds(&self, low: [usize; 2], high: [usize; 2]) -> (bool, bool) {
+        let mut holds = (false, false);
+        for y in low[1]..=high[1] {
+            for x in low[0]..=high[0] {
+                if let Some(light) = self.light[y * (self.cells[0] + 1) + x] {
+                    holds = (true, holds.1 || light.is_crossed);
+                }
+            }
+        }
+        holds
+    }
+
+    fn node(&self, [x, y]: [usize; 2]) -> Option<DVec3> {
+        self.light[y * (self.cells[0] + 1) + x].map(|l| l.irradiance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(light: impl Fn(f64, f64) -> f64) -> Vec<Option<PointLight>> {
+        let at = |k: usize| light((k % 9) as f64 / 8.0, (k / 9) as f64 / 8.0);
+        (0..81).map(|k| Some(PointLight { irradiance: DVec3::splat(at(k)), is_crossed: false })).collect()
+    }
+
+    /// Linear interpolation of x² at spacing h misses h²/4 in the middle: a surplus that falls fourfold a halving.
+    #[test]
+    fn a_parabola_loses_a_sixteenth_of_its_energy_a_halving() {
+        let light = grid(|x, _| x * x);
+        let grid = Grid { cells: [8, 8], light: &light };
+        let coarse = grid.energy(0, 2, [0, 0], [8, 8]);
+        assert!((coarse - HAT * (0.25_f64 * 0.25).powi(2)).abs() < 1e-12, "{coarse}");
+        assert!((grid.energy(0, 1, [0, 0], [8, 8]) - coarse / 16.0).abs() < 1e-12);
+        assert_eq!(grid.energy(1, 1, [0, 0], [8, 8]), 0.0);
+    }
+
+    #[test]
+    fn an_edge_is_where_it_is() {
+        let light = grid(|x, _| f64::from(x > 0.7));
+        let grid = Grid { cells: [8, 8], light: &light };
+        assert_eq!(grid.energy(0, 1, [0, 0], [4, 4]), 0.0);
+        assert!(grid.energy(0, 1, [4, 0], [8, 4]) > 0.0);
+    }
+}

@@ -1,0 +1,77 @@
+//! Stage 6: how fine the texels have to be, and where.
+//!
+//! The light is surveyed first: sampled on grids over every surface that become finer where it bends or
+//! breaks (`survey`). What each halving of the samples' spacing changes is the error that texels of that
+//! spacing leave. Then surfaces are cut into rectangular parts, each with a spacing along either axis,
+//! such that the sum of squared errors and a price for every texel is least; the price is raised until
+//! the texels fit the page (`cut`). This is rate–distortion optimal pruning of a tree of cuts
+//! (P. A. Chou, T. Lookabaugh and R. M. Gray, "Optimal Pruning with Applications to Tree-Structured
+//! Source Coding and Modeling", 1989), with the bits being texels.
+
+mod cut;
+mod detail;
+mod survey;
+
+use glam::DVec2;
+
+use crate::raster::Lighting;
+use crate::unwrap::Part;
+
+/// What is known before the survey.
+#[derive(Clone, Copy, Debug)]
+pub struct DensityOptions {
+    /// How many texels all charts may take together with their padding.
+    pub texels: f64,
+    /// The longest that a chart may be, texels.
+    pub longest: f64,
+    /// Free texels around each chart's bilinear footprint.
+    pub padding: u32,
+    /// A texel's side if all were alike, metres.
+    pub uniform_texel: f64,
+}
+
+/// How the surfaces are cut, and what it was told from.
+#[derive(Clone, Debug)]
+pub struct Density {
+    /// Ordered by surface; weights are texels a metre.
+    pub parts: Vec<Part>,
+    /// Points at which light was evaluated.
+    pub samples: u64,
+}
+
+/// Cuts the surfaces into parts whose texels are as fine as the light needs.
+#[must_use]
+pub fn apportion(lighting: &Lighting, options: DensityOptions) -> Density {
+    let surveys = survey::survey(lighting, options);
+    let parts = cut::cut(lighting.surfaces(), &surveys, options);
+    Density { parts, samples: surveys.samples }
+}
+
+/// How much error there is at each spacing: levels count halvings of a surface's first spacing.
+const LEVELS: usize = 14;
+
+/// For either axis, what halving the samples' spacing for the `n + 1`-th time changes: mean squared
+/// difference of irradiance, in the scene's units squared.
+type Energy = [[f32; LEVELS]; 2];
+
+/// A rectangle of a surface and the error in it.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    min: DVec2,
+    max: DVec2,
+    energy: Energy,
+    /// Halvings that were looked at, for either axis; what `energy` tells of finer ones is a guess.
+    levels: [usize; 2],
+}
+
+/// What is known of the light on one surface.
+#[derive(Clone, Debug)]
+struct SurfaceSurvey {
+    /// The surface's bounding rectangle.
+    min: DVec2,
+    max: DVec2,
+    /// The spacing before the first halving, metres.
+    base: DVec2,
+    /// Cells that hold something of the surface; they do not overlap.
+    cells: Vec<Cell>,
+}

@@ -1,0 +1,292 @@
+//! Sampling the light, finer where it needs it.
+//!
+//! Every surface begins with a grid of tiles. A tile's four quarters are each a candidate for a tile of
+//! half the spacing; those go first whose finest samples change most for a sample more. A quarter across
+//! which a shadow may fall unseen between the samples is looked into until these are as close as texels
+//! of one density would be.
+
+use glam::{DAffine2, DMat2, DVec2};
+use rayon::prelude::*;
+
+use super::detail::Grid;
+use super::{Cell, DensityOptions, Energy, LEVELS, SurfaceSurvey};
+use crate::geom::polygon::rectangle;
+use crate::raster::Lighting;
+use crate::surface::Surface;
+use crate::unwrap::Chart;
+
+/// Cells along a tile's side, at most.
+const TILE: usize = 8;
+
+/// The first samples lie this many uniform texels apart.
+const FIRST_SPACING: f64 = 4.0;
+
+/// Shadows that fall between samples are looked for until these are this many uniform texels apart.
+const BLIND_SPACING: f64 = 1.0;
+
+/// Samples for each texel, at most.
+const SAMPLES_A_TEXEL: f64 = 2.5;
+
+/// The share of them that looking for shadows may take.
+const BLIND_SHARE: f64 = 0.5;
+
+/// How often it is decided anew where to look closer.
+const ROUNDS: u32 = 10;
+
+/// Samples are never closer than this many uniform texels.
+const LEAST_SPACING: f64 = 1.0 / 64.0;
+
+/// From one halving to the next the error falls at least by this: light that breaks,
+const SLOWEST: f64 = 0.5;
+/// and at most by this: light that bends.
+const FASTEST: f64 = 1.0 / 16.0;
+
+/// The surveys of all surfaces, in order.
+pub(super) struct Surveys {
+    pub surfaces: Vec<SurfaceSurvey>,
+    pub samples: u64,
+    /// The error that one sample more would find, about: squared irradiance times area.
+    pub price: f64,
+}
+
+/// A rectangle of a surface, how finely it was looked at, and what was found.
+#[derive(Clone, Copy)]
+struct Quarter {
+    surface: usize,
+    min: DVec2,
+    max: DVec2,
+    /// Cells of the tile that it is a quarter of; also those of its own tile.
+    cells: [usize; 2],
+    /// Halvings so far, for either axis.
+    levels: [usize; 2],
+    energy: Energy,
+    is_crossed: bool,
+}
+
+/// Looks at the light on all surfaces.
+pub(super) fn survey(lighting: &Lighting, options: DensityOptions) -> Surveys {
+    let surfaces = lighting.surfaces();
+    let roots: Vec<Root> = surfaces.iter().map(|s| Root::of(s, options.uniform_texel)).collect();
+    let tiles: Vec<Tile> = roots.iter().enumerate().flat_map(|(index, root)| root.tiles(index)).collect();
+    let mut samples = 0;
+    let mut look = |tiles: &[Tile]| -> Vec<Quarter> {
+        samples += tiles.iter().map(Tile::samples).sum::<u64>();
+        tiles.par_iter().map(|tile| tile.look(lighting)).collect::<Vec<_>>().into_iter().flatten().collect()
+    };
+    let mut quarters = look(&tiles);
+    let budget = (SAMPLES_A_TEXEL * options.texels) as u64;
+    let mut left = budget;
+
+    // Shadows between the samples.
+    let is_blind =
+        |q: &Quarter| q.is_crossed && q.spacing().max_element() > BLIND_SPACING * options.uniform_texel;
+    let mut blind = (BLIND_SHARE * budget as f64) as u64;
+    loop {
+        let (mut closer, rest): (Vec<_>, Vec<_>) = quarters.into_iter().partition(is_blind);
+        quarters = rest;
+        let affordable = affordable(&closer, blind);
+        let over = closer.split_off(affordable);
+        quarters.extend(over.iter().copied());
+        if closer.is_empty() {
+            break;
+        }
+        let tiles: Vec<Tile> = closer.iter().map(Quarter::tile).collect();
+        let spent: u64 = tiles.iter().map(Tile::samples).sum();
+        (left, blind) = (left.saturating_sub(spent), blind - spent);
+        quarters.extend(look(&tiles));
+        if !over.is_empty() {
+            break;
+        }
+    }
+
+    let mut price = 0.0;
+    for round in 0..ROUNDS {
+        let share = left / u64::from(ROUNDS - round);
+        let is_candidate = |q: &Quarter| {
+            q.worth() > 0.0
+                && q.levels[0].max(q.levels[1]) + 1 < LEVELS
+                && q.spacing().max_element() > LEAST_SPACING * options.uniform_texel
+        };
+        let (mut candidates, rest): (Vec<_>, Vec<_>) = quarters.into_iter().partition(is_candidate);
+        quarters = rest;
+        candidates.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
+        let affordable = affordable(&candidates, share);
+        quarters.extend(candidates.split_off(affordable));
+        price = candidates.last().map_or(price, Quarter::worth);
+        let tiles: Vec<Tile> = candidates.iter().map(Quarter::tile).collect();
+        left = left.saturating_sub(tiles.iter().map(Tile::samples).sum());
+        quarters.extend(look(&tiles));
+    }
+
+    let mut found: Vec<SurfaceSurvey> = roots.iter().map(Root::survey).collect();
+    for quarter in quarters {
+        found[quarter.surface].cells.push(quarter.cell());
+    }
+    for survey in &mut found {
+        survey.cells.sort_by(|a, b| a.min.y.total_cmp(&b.min.y).then(a.min.x.total_cmp(&b.min.x)));
+    }
+    tracing::debug!(samples, budget, cells = found.iter().map(|s| s.cells.len()).sum::<usize>(), "survey");
+    Surveys { surfaces: found, samples, price }
+}
+
+/// How many of `quarters`, from the first, can be looked into with so many samples.
+fn affordable(quarters: &[Quarter], samples: u64) -> usize {
+    let mut sum = 0;
+    quarters
+        .iter()
+        .take_while(|q| {
+            sum += q.tile().samples();
+            sum <= samples
+        })
+        .count()
+}
+
+/// A surface's first tiles.
+struct Root {
+    min: DVec2,
+    max: DVec2,
+    tiles: [usize; 2],
+    cells: [usize; 2],
+}
+
+impl Root {
+    fn of(surface: &Surface, uniform_texel: f64) -> Self {
+        let (min, max) = surface.extent();
+        let (mut tiles, mut cells) = ([1; 2], [2; 2]);
+        for axis in 0..2 {
+            let wanted = ((max - min)[axis] / (FIRST_SPACING * uniform_texel)).ceil();
+            let wanted = if wanted.is_finite() { wanted.clamp(1.0, 4096.0) as usize } else { 1 };
+            cells[axis] = wanted.next_power_of_two().clamp(2, TILE);
+            tiles[axis] = wanted.div_ceil(TILE);
+        }
+        Self { min, max, tiles, cells }
+    }
+
+    fn tile_size(&self) -> DVec2 {
+        (self.max - self.min) / DVec2::new(self.tiles[0] as f64, self.tiles[1] as f64)
+    }
+
+    fn tiles(&self, surface: usize) -> Vec<Tile> {
+        let size = self.tile_size();
+        if !size.is_finite() || size.min_element() <= 0.0 {
+            return Vec::new();
+        }
+        let tile = |k: usize| {
+            let at = DVec2::new((k % self.tiles[0]) as f64, (k / self.tiles[0]) as f64);
+            let min = self.min + at * size;
+            let levels = self.cells.map(|c| c.ilog2() as usize);
+            Tile { surface, min, max: min + size, cells: self.cells, levels, known: None }
+        };
+        (0..self.tiles[0] * self.tiles[1]).map(tile).collect()
+    }
+
+    fn survey(&self) -> SurfaceSurvey {
+        SurfaceSurvey { min: self.min, max: self.max, base: self.tile_size(), cells: Vec::new() }
+    }
+}
+
+/// A grid of samples to be taken.
+struct Tile {
+    surface: usize,
+    min: DVec2,
+    max: DVec2,
+    cells: [usize; 2],
+    levels: [usize; 2],
+    /// What coarser samples told, if there were any.
+    known: Option<Energy>,
+}
+
+impl Tile {
+    fn samples(&self) -> u64 {
+        ((self.cells[0] + 1) * (self.cells[1] + 1)) as u64
+    }
+
+    /// Takes the samples.
+    fn look(&self, lighting: &Lighting) -> Vec<Quarter> {
+        let cells = DVec2::new(self.cells[0] as f64, self.cells[1] as f64);
+        let scale = cells / (self.max - self.min);
+        let chart = Chart {
+            surface: self.surface,
+            outline: rectangle(self.min, self.max).to_vec(),
+            texel_from_plane: DAffine2::from_mat2_translation(
+                DMat2::from_diagonal(scale),
+                DVec2::splat(0.5) - scale * self.min,
+            ),
+        };
+        let light = lighting.at_centres(&chart, (self.cells[0] as u32 + 1, self.cells[1] as u32 + 1));
+        let grid = Grid { cells: self.cells, light: &light };
+        (0..4).filter_map(|k| self.quarter(&grid, [k % 2, k / 2])).collect()
+    }
+
+    /// One of the four quarters; `None` where nothing of the surface lies in it.
+    fn quarter(&self, grid: &Grid, at: [usize; 2]) -> Option<Quarter> {
+        let half = self.cells.map(|c| c / 2);
+        let low = [at[0] * half[0], at[1] * half[1]];
+        let high = [low[0] + half[0], low[1] + half[1]];
+        let (is_seen, is_crossed) = grid.holds(low, high);
+        if !is_seen {
+            return None;
+        }
+        let mut energy = self.known.unwrap_or_default();
+        for axis in 0..2 {
+            // Coarser halvings are known from the tile that this one is a quarter of.
+            let steps = if self.known.is_some() { 1 } else { self.levels[axis] };
+            for step in 0..steps {
+                let found = grid.energy(axis, 1 << step, low, high);
+                energy[axis][self.levels[axis] - 1 - step] = found as f32;
+            }
+        }
+        let middle = 0.5 * (self.min + self.max);
+        let pick = |low: DVec2, high: DVec2| {
+            DVec2::new(if at[0] == 0 { low.x } else { high.x }, if at[1] == 0 { low.y } else { high.y })
+        };
+        let (min, max) = (pick(self.min, middle), pick(middle, self.max));
+        let (surface, cells, levels) = (self.surface, self.cells, self.levels);
+        Some(Quarter { surface, min, max, cells, levels, energy, is_crossed })
+    }
+}
+
+impl Quarter {
+    fn size(&self) -> DVec2 {
+        self.max - self.min
+    }
+
+    /// Between samples, metres.
+    fn spacing(&self) -> DVec2 {
+        2.0 * self.size() / DVec2::new(self.cells[0] as f64, self.cells[1] as f64)
+    }
+
+    /// The tile that looks closer.
+    fn tile(&self) -> Tile {
+        let Self { surface, min, max, cells, levels, energy, .. } = *self;
+        Tile { surface, min, max, cells, levels: levels.map(|l| l + 1), known: Some(energy) }
+    }
+
+    /// What the last halving changed, for each sample that another one takes.
+    fn worth(&self) -> f64 {
+        let last = |axis: usize| f64::from(self.energy[axis][self.levels[axis] - 1]);
+        self.size().element_product() * (last(0) + last(1)) / self.tile().samples() as f64
+    }
+
+    /// What was found, and what follows from it about finer halvings.
+    fn cell(&self) -> Cell {
+        let mut energy = self.energy;
+        let next = [0, 1].map(|axis| {
+            let (row, level) = (&self.energy[axis], self.levels[axis]);
+            let last = f64::from(row[level - 1]);
+            let before = level.checked_sub(2).map_or(0.0, |l| f64::from(row[l]));
+            let ratio = if before > 0.0 { (last / before).clamp(FASTEST, SLOWEST) } else { 0.5 * SLOWEST };
+            (ratio * last, ratio)
+        });
+        // Which way an edge runs is known no finer than it was looked at.
+        let (most, ratio) = if next[0].0 > next[1].0 { next[0] } else { next[1] };
+        for (row, &level) in energy.iter_mut().zip(&self.levels) {
+            let mut value = most;
+            for slot in row.iter_mut().skip(level) {
+                *slot = value as f32;
+                value *= ratio;
+            }
+        }
+        Cell { min: self.min, max: self.max, energy, levels: self.levels }
+    }
+}
