@@ -40,6 +40,9 @@ pub(super) enum Component {
 }
 
 impl Component {
+    /// glTF's number of 32-bit floats.
+    pub(super) const FLOAT: usize = 5126;
+
     fn from_number(number: usize) -> Option<Self> {
         Some(match number {
             5120 => Self::I8,
@@ -47,7 +50,7 @@ impl Component {
             5122 => Self::I16,
             5123 => Self::U16,
             5125 => Self::U32,
-            5126 => Self::F32,
+            Self::FLOAT => Self::F32,
             _ => return None,
         })
     }
@@ -73,8 +76,21 @@ impl Component {
         }
     }
 
+    /// Appends the value of this type nearest to `value`.
+    pub(super) fn write(self, value: f64, bytes: &mut Vec<u8>) {
+        let whole = value.round();
+        match self {
+            Self::I8 => bytes.extend((whole as i8).to_le_bytes()),
+            Self::U8 => bytes.extend((whole as u8).to_le_bytes()),
+            Self::I16 => bytes.extend((whole as i16).to_le_bytes()),
+            Self::U16 => bytes.extend((whole as u16).to_le_bytes()),
+            Self::U32 => bytes.extend((whole as u32).to_le_bytes()),
+            Self::F32 => bytes.extend((value as f32).to_le_bytes()),
+        }
+    }
+
     /// What a stored integer is divided by where it stands for a fraction.
-    fn fraction_of(self) -> f64 {
+    pub(super) fn fraction_of(self) -> f64 {
         match self {
             Self::I8 => 127.0,
             Self::U8 => 255.0,
@@ -97,13 +113,25 @@ impl Elements {
         values.map(|bytes| (self.component.value(bytes) / divisor).max(least(divisor)) as f32).collect()
     }
 
+    /// The same values in 32-bit floats. Not for matrices.
+    pub(super) fn widened(&self) -> Self {
+        let bytes = self.floats().into_iter().flat_map(f32::to_le_bytes).collect();
+        let (component, components) = (Component::F32, self.components);
+        Self { bytes, size: 4 * components, component, components, normalized: false }
+    }
+
+    /// One element's numbers as they are stored; none where there is no such element.
+    pub(super) fn numbers(&self, index: u32) -> impl Iterator<Item = f64> + '_ {
+        let bytes = self.element(index).unwrap_or_default().chunks_exact(self.component.size());
+        bytes.map(|bytes| self.component.value(bytes))
+    }
+
     /// Least and greatest value of each component over `picked` elements, as glTF's `min` and `max`.
-    pub(super) fn extremes(&self, picked: &[u32]) -> Option<(Vec<Value>, Vec<Value>)> {
+    pub(super) fn extremes(&self, picked: impl IntoIterator<Item = u32>) -> Option<(Vec<Value>, Vec<Value>)> {
         let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); self.components];
-        for &element in picked {
-            let bytes = self.element(element)?.chunks_exact(self.component.size());
-            for ((low, high), bytes) in range.iter_mut().zip(bytes) {
-                let value = self.component.value(bytes);
+        for element in picked {
+            self.element(element)?;
+            for ((low, high), value) in range.iter_mut().zip(self.numbers(element)) {
                 (*low, *high) = (low.min(value), high.max(value));
             }
         }
@@ -276,7 +304,7 @@ mod tests {
         let elements = read(&source, 0, 3).unwrap();
         assert_eq!(elements.bytes, [3, 4, 11, 12, 19, 20]);
         assert_eq!(elements.floats()[1], 4.0 / 255.0);
-        let (low, high) = elements.extremes(&[1, 0]).unwrap();
+        let (low, high) = elements.extremes([1, 0]).unwrap();
         assert_eq!((low, high), (vec![json!(3), json!(4)], vec![json!(11), json!(12)]));
         assert!(read(&source, 0, 4).is_err(), "another count than the caller expects");
     }

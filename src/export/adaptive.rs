@@ -148,7 +148,7 @@ impl Builder {
         let local = self.node_from_world.transform_point3(world).as_vec3();
         self.positions.extend(local.to_array());
         self.normals.extend(normal.to_array());
-        self.coordinates.extend(chart_coordinates(writer.baked, part.index, world));
+        self.coordinates.extend(chart_coordinates(writer.baked, (part.index, 0), world));
         self.irradiance.extend((vertex.direct + vertex.indirect).as_vec3().to_array());
         Some(index)
     }

@@ -18,7 +18,9 @@
 
 mod accessor;
 mod adaptive;
+mod blend;
 mod compact;
+mod cut;
 mod document;
 mod error;
 mod exr;

@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
+use super::cut::Cuts;
 use super::document::{Object, index_of};
 use super::{Baked, ExportError};
 
@@ -33,6 +34,8 @@ pub(super) struct Plan {
     pub(super) unlit_materials: BTreeSet<usize>,
     /// The surface of each triangle of the scene.
     pub(super) surface_of: Vec<Option<usize>>,
+    /// How triangles are cut.
+    pub(super) cuts: Cuts,
     /// The surfaces of each placement.
     surfaces: BTreeMap<usize, Vec<usize>>,
 }
@@ -71,7 +74,8 @@ impl Plan {
         for (index, surface) in baked.surfaces.iter().enumerate() {
             surfaces.entry(surface.placement).or_default().push(index);
         }
-        let mut plan = Self { nodes, unlit_materials: BTreeSet::new(), surface_of, surfaces };
+        let cuts = Cuts::of(baked);
+        let mut plan = Self { nodes, unlit_materials: BTreeSet::new(), surface_of, cuts, surfaces };
         plan.assign_meshes(baked, &by_node);
         Ok(plan)
     }

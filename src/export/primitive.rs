@@ -29,7 +29,7 @@ pub(super) fn prepare(
         .filter_map(|index| list.and_then(|list| list.get(index)))
         .any(uses_lightmap_set);
     let moved = free_set(primitive).filter(|_| read);
-    for attributes in attribute_maps(primitive) {
+    for (attributes, _) in attribute_maps(primitive) {
         let old = attributes.shift_remove(&set_name(LIGHTMAP_SET));
         match (old, moved) {
             (Some(accessor), Some(set)) => {
@@ -77,14 +77,15 @@ pub(super) fn set_name(set: usize) -> String {
     format!("TEXCOORD_{set}")
 }
 
-/// The primitive's attributes and those of its morph targets.
-pub(super) fn attribute_maps(primitive: &mut Object) -> Vec<&mut Object> {
+/// The primitive's attributes and those of its morph targets, the latter marked.
+pub(super) fn attribute_maps(primitive: &mut Object) -> Vec<(&mut Object, bool)> {
     let mut maps = Vec::new();
     for (key, value) in primitive {
         match (key.as_str(), value) {
-            ("attributes", Value::Object(attributes)) => maps.push(attributes),
+            ("attributes", Value::Object(attributes)) => maps.push((attributes, false)),
             ("targets", Value::Array(targets)) => {
-                maps.extend(targets.iter_mut().filter_map(Value::as_object_mut));
+                let targets = targets.iter_mut().filter_map(Value::as_object_mut);
+                maps.extend(targets.map(|target| (target, true)));
             }
             _ => {}
         }

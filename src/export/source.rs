@@ -4,15 +4,19 @@
 //! Where one has, every attribute and morph target is written anew, byte for byte, with the copies
 //! at the end; instances whose tables of copies are equal share the result. Strips and fans become
 //! lists, since their corners cannot be split.
+//!
+//! Triangles of surfaces with several charts are cut along the charts' borders; what is new there is
+//! interpolated, see [`super::blend`].
 
 use std::collections::BTreeMap;
 
 use serde_json::Value;
 
 use super::ExportError;
-use super::accessor;
+use super::accessor::{self, Component};
+use super::blend::{Blend, Kind, blend};
 use super::document::{Document, Object, Target, index_of};
-use super::pool::{self, Pool};
+use super::pool::{Charted, Pool};
 use super::primitive::{attribute_maps, insert_coordinates, prepare};
 use super::writer::Writer;
 use crate::scene::Placement;
@@ -26,8 +30,8 @@ type Known<T> = Vec<(Vec<T>, usize)>;
 /// Accessors that were written anew, so that instances can share them.
 #[derive(Debug, Default)]
 pub(super) struct Rewritten {
-    /// By source accessor: the table of source vertices, and the new accessor.
-    attributes: BTreeMap<usize, Known<u32>>,
+    /// By source accessor and the way to mix: the table of vertices, and the new accessor.
+    attributes: BTreeMap<(usize, Kind), Known<Blend>>,
     /// By mesh and primitive: the triangles, and their accessor.
     indices: BTreeMap<(usize, usize), Known<[u32; 3]>>,
 }
@@ -47,17 +51,20 @@ pub(super) fn rewrite(
 ) -> Result<(), ExportError> {
     for group in group(placements, primitives)? {
         let count = vertex_count(writer, &group)?;
-        let pool = pool::build(writer.baked, &writer.plan.surface_of, &group.placements, count)?;
+        let charted =
+            Charted { baked: writer.baked, surface_of: &writer.plan.surface_of, cuts: &writer.plan.cuts };
+        let pool = charted.pool(&group.placements, count)?;
         let coordinates = writer.document.add_floats(pool.coordinates.as_flattened(), 2);
         for (placement, corners) in group.placements.iter().zip(&pool.corners) {
             let primitive = primitives.get_mut(placement.primitive).and_then(Value::as_object_mut);
             let primitive = primitive.ok_or_else(|| not_there(placement))?;
             prepare(&mut writer.document, &mut writer.materials, primitive, placement.mesh)?;
             if !pool.unsplit {
-                for attributes in attribute_maps(primitive) {
-                    for value in attributes.values_mut() {
+                for (attributes, target) in attribute_maps(primitive) {
+                    for (name, value) in attributes {
                         if let Some(accessor) = index_of(Some(value)) {
-                            *value = expand(writer, accessor, &pool, count)?.into();
+                            let kind = Kind::of(name, target);
+                            *value = expand(writer, (accessor, kind), &pool, count)?.into();
                         }
                     }
                 }
@@ -65,7 +72,7 @@ pub(super) fn rewrite(
             insert_coordinates(primitive, coordinates);
             let mode = primitive.get("mode").and_then(Value::as_u64).unwrap_or(TRIANGLES);
             if !pool.unsplit || mode != TRIANGLES {
-                let indices = list_of_triangles(writer, placement, corners, pool.sources.len());
+                let indices = list_of_triangles(writer, placement, corners, pool.vertices.len());
                 primitive.insert("indices".into(), indices.into());
                 primitive.shift_remove("mode");
             }
@@ -108,26 +115,39 @@ fn vertex_count(writer: &Writer, group: &Group) -> Result<usize, ExportError> {
     }
 }
 
-/// The accessor that holds `accessor`'s elements in the pool's order.
-fn expand(writer: &mut Writer, accessor: usize, pool: &Pool, count: usize) -> Result<usize, ExportError> {
-    let known = writer.rewritten.attributes.get(&accessor);
-    let known = known.and_then(|list| list.iter().find(|(sources, _)| *sources == pool.sources));
+/// The accessor that holds an accessor's elements in the pool's order, mixed where the pool's vertices are.
+fn expand(
+    writer: &mut Writer,
+    (accessor, kind): (usize, Kind),
+    pool: &Pool,
+    count: usize,
+) -> Result<usize, ExportError> {
+    // Copies are the same whatever they are of.
+    let mixed = pool.vertices.iter().any(|vertex| vertex.original().is_none());
+    let kind = if mixed { kind } else { Kind::Choice };
+    let known = writer.rewritten.attributes.get(&(accessor, kind));
+    let known = known.and_then(|list| list.iter().find(|(vertices, _)| *vertices == pool.vertices));
     if let Some(&(_, made)) = known {
         return Ok(made);
     }
-    let elements = accessor::read(writer.document.source, accessor, count)?;
+    let source = accessor::read(writer.document.source, accessor, count)?;
+    let elements = blend(&source, kind, &pool.vertices);
     let stride = elements.size.next_multiple_of(4);
-    let mut bytes = Vec::with_capacity(pool.sources.len() * stride);
-    for &source in &pool.sources {
-        bytes.extend_from_slice(elements.element(source).unwrap_or_default());
+    let mut bytes = Vec::with_capacity(pool.vertices.len() * stride);
+    for element in elements.bytes.chunks_exact(elements.size.max(1)) {
+        bytes.extend_from_slice(element);
         bytes.resize(bytes.len().next_multiple_of(4), 0);
     }
     let original = writer.document.list("accessors").get(accessor).and_then(Value::as_object);
     let mut description: Object = original.cloned().unwrap_or_default();
     description.shift_remove("sparse");
-    description.insert("count".into(), pool.sources.len().into());
+    description.insert("count".into(), pool.vertices.len().into());
+    if elements.component != source.component {
+        description.insert("componentType".into(), Component::FLOAT.into());
+        description.shift_remove("normalized");
+    }
     if !pool.complete && (description.contains_key("min") || description.contains_key("max")) {
-        match elements.extremes(&pool.sources) {
+        match elements.extremes((0..).take(pool.vertices.len())) {
             Some((min, max)) => {
                 description.insert("min".into(), min.into());
                 description.insert("max".into(), max.into());
@@ -139,7 +159,8 @@ fn expand(writer: &mut Writer, accessor: usize, pool: &Pool, count: usize) -> Re
         }
     }
     let made = writer.document.add_accessor(description, Target::Vertices(stride), &bytes);
-    writer.rewritten.attributes.entry(accessor).or_default().push((pool.sources.clone(), made));
+    let known = writer.rewritten.attributes.entry((accessor, kind)).or_default();
+    known.push((pool.vertices.clone(), made));
     Ok(made)
 }
 
