@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 22] = [
+const OPTIONS: [&str; 23] = [
     "--output",
     "--size",
     "--texels-per-metre",
@@ -32,6 +32,7 @@ const OPTIONS: [&str; 22] = [
     "--no-umbra-test",
     "--unshot-fraction",
     "--gather-error",
+    "--density",
     "--padding",
     "--scene",
     "--quiet",
@@ -345,11 +346,29 @@ fn stage_times_fit_into_the_total() {
 fn pictures_are_pngs_in_a_folder_made_for_them() {
     let work = Workplace::new();
     work.bake(&["--pictures", "made/for/pictures"]).done();
-    let names = ["lightmap.png", "surface-1-elements.png", "surface-1-cob.png", "surface-1-triangles.png"];
-    for name in names {
+    let of_surface = ["elements", "cob", "triangles", "density"].map(|what| format!("surface-1-{what}.png"));
+    let of_all = ["lightmap.png", "density.png", "scene.png"].map(str::to_owned);
+    for name in of_all.iter().chain(&of_surface) {
         let picture = std::fs::read(work.path("made/for/pictures").join(name)).expect("a picture");
         assert!(picture.starts_with(b"\x89PNG\r\n\x1a\n"), "{name}");
     }
+}
+
+/// Both halves of the picture of the scene show the same things, and the whole of it.
+#[test]
+fn the_scene_is_shown_twice() {
+    let work = Workplace::new();
+    work.bake(&["--pictures", "pictures"]).done();
+    let picture = image::open(work.path("pictures/scene.png")).expect("a picture").into_rgb8();
+    let white = |x, y| picture.get_pixel(x, y).0 == [255; 3];
+    let (half, bar) = (900, 84);
+    let shown: Vec<(u32, u32)> = (0..picture.height() - bar)
+        .flat_map(|y| (0..half).map(move |x| (x, y)))
+        .filter(|&(x, y)| !white(x, y))
+        .collect();
+    let other = shown.iter().filter(|&&(x, y)| !white(x + picture.width() - half, y)).count();
+    assert!(shown.len() > 300_000, "{}", shown.len());
+    assert!(shown.len() - other < 2_000, "{} against {other}", shown.len());
 }
 
 /// The whole of a bake: every stage ran, light was shot, texels hold it.

@@ -45,7 +45,8 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
 
-    /// Write the lightmap and the largest surfaces' meshes as PNGs into this folder, made if there is none
+    /// Write the lightmap, the density of its texels and the largest surfaces' meshes as PNGs into this folder, made
+    /// if there is none
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
 

@@ -59,6 +59,7 @@ fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
             surfaces: &result.surfaces,
             facets: &result.facets,
             mesh: &result.mesh,
+            atlas: &result.atlas,
         };
         let pictures = picture::pictures(subject).context("cannot draw the pictures")?;
         for (name, png) in pictures {

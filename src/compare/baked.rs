@@ -7,13 +7,13 @@ use glam::{DVec2, DVec3};
 use serde_json::Value;
 
 use super::CompareError;
-use super::bilinear::sample;
 use super::hidden::is_inside_a_solid;
 use super::triangle::{nearest, point};
 use crate::export::{COBAKE_LIGHTMAP, LIGHTMAP_SET, decode_exr};
 use crate::geom::Bounds;
 use crate::geom::triangle::area_normal;
 use crate::options::Quantity;
+use crate::picture::sample;
 use crate::raster::Lightmap;
 use crate::scene::{ImportOptions, Scene, load};
 use crate::trace::Tracer;

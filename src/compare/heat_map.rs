@@ -7,7 +7,7 @@
 use super::CompareError;
 use super::figures::Percentiles;
 use super::page::{PageLight, TexelLight};
-use crate::picture::{Colour, encode_rgb};
+use crate::picture::{Colour, encode_rgb, shade};
 
 /// The scale ends at the first round number above this percentile of the errors.
 const SCALE_PERCENTILE: f64 = 99.0;
@@ -76,10 +76,7 @@ fn round_up(value: f64) -> f64 {
 
 /// The colour of `share` of the scale.
 fn magma(share: f64) -> Colour {
-    let place = share.clamp(0.0, 1.0) * (MAGMA.len() - 1) as f64;
-    let get = |index: usize| MAGMA.get(index.min(MAGMA.len() - 1)).copied().unwrap_or_default();
-    let (low, high) = (get(place as usize), get(place as usize + 1));
-    std::array::from_fn(|k| (255.0 * (low[k] + place.fract() * (high[k] - low[k]))).round() as u8)
+    shade(&MAGMA, share)
 }
 
 #[cfg(test)]

@@ -12,7 +12,6 @@
 //! Nothing here is random: the same files give the same figures at any number of threads.
 
 mod baked;
-mod bilinear;
 mod error;
 mod figures;
 mod flip;

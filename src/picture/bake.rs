@@ -1,7 +1,8 @@
-//! The pictures of a bake: the page, and for each large surface its elements, buffers and triangles.
+//! The pictures of a bake: the page, the scene, and for each large surface its elements, buffers, triangles and charts.
 
 use glam::DVec3;
 
+use super::density::Densities;
 use super::{
     Cell, Colour, EMPTY, MeshDrawing, NOT_EMPTY, PictureError, ToneMap, UNINITIALIZED, lightmap_png,
 };
@@ -10,6 +11,7 @@ use crate::element::{Facet, Side};
 use crate::raster::Lightmap;
 use crate::retriangulate::{RadiosityMesh, SurfaceMesh};
 use crate::surface::Surface;
+use crate::unwrap::Atlas;
 
 /// This many surfaces are drawn, the largest first.
 const SURFACES: usize = 8;
@@ -25,19 +27,34 @@ pub struct Subject<'a> {
     pub facets: &'a [Facet],
     /// Their final triangles.
     pub mesh: &'a RadiosityMesh,
+    /// Where they lie in the page.
+    pub atlas: &'a Atlas,
 }
 
 /// A file name and its PNG.
 pub type Picture = (String, Vec<u8>);
 
-/// Draws everything: `lightmap.png`, and for the largest surfaces `surface-N-elements.png` (the paper's
-/// figure 5), `surface-N-cob.png` (grey: never asked, blue: empty, orange: not empty) and
-/// `surface-N-triangles.png`, where `N` is the surface's rank by area.
+/// Draws everything:
+///
+/// - `lightmap.png`, the page, tone-mapped;
+/// - `density.png`, the page with every chart coloured by its texels per metre (the geometric mean of those along
+///   its axes) on a logarithmic scale from violet (few) to yellow (many), see the legend; what no lookup touches is
+///   dark;
+/// - `scene.png`, the whole scene from a corner above, without the walls in front: coloured so to the left, lit by
+///   the lightmap, tone-mapped, to the right;
+/// - for the largest surfaces `surface-N-elements.png` (the paper's figure 5), `surface-N-cob.png` (grey: never
+///   asked, blue: empty, orange: not empty), `surface-N-triangles.png` and `surface-N-density.png`, where `N` is the
+///   surface's rank by area.
 ///
 /// # Errors
 /// [`PictureError::Encode`] if a picture cannot be encoded.
 pub fn pictures(subject: Subject) -> Result<Vec<Picture>, PictureError> {
-    let mut pictures = vec![("lightmap.png".to_owned(), lightmap_png(subject.lightmap)?)];
+    let densities = Densities::of(subject);
+    let mut pictures = vec![
+        ("lightmap.png".to_owned(), lightmap_png(subject.lightmap)?),
+        ("density.png".to_owned(), densities.page_png()?),
+        ("scene.png".to_owned(), densities.scene_png()?),
+    ];
     let mut order: Vec<usize> = (0..subject.surfaces.len()).collect();
     order.sort_by(|&a, &b| subject.surfaces[b].area.total_cmp(&subject.surfaces[a].area).then(a.cmp(&b)));
     for (rank, &index) in order.iter().take(SURFACES).enumerate() {
@@ -50,9 +67,11 @@ pub fn pictures(subject: Subject) -> Result<Vec<Picture>, PictureError> {
             ("cob", buffers(&facets)),
             ("triangles", triangles(mesh, &tones)),
         ];
+        let name = |what: &str| format!("surface-{}-{what}.png", rank + 1);
         for (what, drawing) in drawings {
-            pictures.push((format!("surface-{}-{what}.png", rank + 1), drawing.png()?));
+            pictures.push((name(what), drawing.png()?));
         }
+        pictures.push((name("density"), densities.plan_png(index)?));
     }
     Ok(pictures)
 }

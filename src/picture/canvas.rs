@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::Colour;
 
 /// Samples a pixel in each direction.
-const SAMPLES: u32 = 2;
+pub(super) const SAMPLES: u32 = 2;
 
 /// A picture in the making. Coordinates are pixels, `(0, 0)` the top left corner, `y` downward.
 #[derive(Clone, Debug)]
@@ -20,6 +20,13 @@ impl Canvas {
     pub(super) fn new(width: u32, height: u32, paper: Colour) -> Self {
         let count = (width * SAMPLES) as usize * (height * SAMPLES) as usize;
         Self { width, height, samples: vec![paper; count] }
+    }
+
+    /// A canvas whose samples are what `colour` says of their columns and rows.
+    pub(super) fn sampled(width: u32, height: u32, colour: impl Fn(u32, u32) -> Colour) -> Self {
+        let (columns, rows) = (width * SAMPLES, height * SAMPLES);
+        let samples = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+        Self { width, height, samples: samples.map(|(x, y)| colour(x, y)).collect() }
     }
 
     /// Fills a polygon by the even-odd rule. Samples on an edge shared by two polygons go to one of them.

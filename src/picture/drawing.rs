@@ -1,8 +1,7 @@
 //! Planar meshes as pictures: filled cells, their outlines, lines on top, a row of swatches.
 //!
-//! Three pictures are meant to be drawn with this: a surface's elements filled by their
-//! irradiance (as in figure 5 of Telea and van Overveld 1997), its Close Objects Buffers by state,
-//! and the final triangles.
+//! Four pictures are drawn with this: a surface's elements filled by their irradiance (as in figure 5 of
+//! Telea and van Overveld 1997), its Close Objects Buffers by state, the final triangles, and the charts.
 
 use glam::DVec2;
 
@@ -109,6 +108,12 @@ impl MeshDrawing {
     ///
     /// [`PictureError::Encode`] if the encoder refuses the picture.
     pub fn png(&self) -> Result<Vec<u8>, PictureError> {
+        let (pixels, size) = self.pixels();
+        png::encode(&pixels, size)
+    }
+
+    /// The drawing as 8-bit RGB rows, its width and its height.
+    pub(super) fn pixels(&self) -> (Vec<u8>, (u32, u32)) {
         let longest = f64::from(self.longest_side.clamp(64, LARGEST)) - 2.0 * BORDER;
         let view = Viewport::around(self, longest);
         let size = view.size();
@@ -135,7 +140,7 @@ impl MeshDrawing {
             canvas.fill(&square(corner, SWATCH), INK);
             canvas.fill(&square(corner + 1.0, SWATCH - 2.0), colour);
         }
-        png::encode(&canvas.into_pixels(), (width, height))
+        (canvas.into_pixels(), (width, height))
     }
 }
 

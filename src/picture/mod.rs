@@ -1,17 +1,25 @@
 //! After the last stage: pictures for people.
 //!
 //! Lightmaps and planar drawings become PNG: what the solver did to a surface can be looked at
-//! without a viewer. Only [`pictures`] knows the stages' types; the rest takes plain data, polygons
-//! and colours. Pictures carry no text; their file names say what they show.
+//! without a viewer, and so does the density of texels. Only [`pictures`] and the densities know the
+//! stages' types; the rest takes plain data, polygons and colours. Legends of densities carry numbers; of all
+//! else the file names say what it shows.
 
 mod bake;
+mod bilinear;
 mod canvas;
+mod colour_map;
+mod density;
 mod drawing;
 mod lightmap;
 mod png;
+mod scale;
 mod tone;
+mod view;
 
 pub use bake::{Picture, Subject, pictures};
+pub(crate) use bilinear::sample;
+pub(crate) use colour_map::shade;
 pub use drawing::{Cell, Line, MeshDrawing};
 pub use lightmap::lightmap_png;
 pub(crate) use png::encode as encode_rgb;

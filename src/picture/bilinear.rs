@@ -6,7 +6,7 @@ use crate::raster::Lightmap;
 
 /// The page's value at `at`: bilinear, clamped to the edge, (0, 0) the top left corner, texel centres at
 /// ((x + 1/2) / width, (y + 1/2) / height).
-pub(super) fn sample(page: &Lightmap, at: DVec2) -> DVec3 {
+pub(crate) fn sample(page: &Lightmap, at: DVec2) -> DVec3 {
     let size = DVec2::new(page.width.into(), page.height.into());
     let last = (size - 1.0).max(DVec2::ZERO);
     let place = (at * size - 0.5).clamp(DVec2::ZERO, last);
