@@ -30,6 +30,7 @@ SETS = {
 }
 ERROR = "relative RMS error of irradiance, %"
 SECONDS = "CPU seconds"
+DENSITIES = {"light": dict(color=BLUE, marker="o", linewidth=2.0), "uniform": dict(color=BLACK, marker="s")}
 
 plt.rcParams |= {
     "font.size": 9,
@@ -183,6 +184,28 @@ def draw_rooms(rows, peers, folder):
     save(figure, folder, "time-rooms")
 
 
+def draw_bytes(rows, folder):
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    figure, grid = plt.subplots(
+        len(scenes), 3, figsize=(13, 3.4 * len(scenes)), layout="constrained", sharex="row", squeeze=False
+    )
+    for panels, scene in zip(grid, scenes):
+        for panel, name in zip(panels, SETS):
+            for density, style in DENSITIES.items():
+                group = [row | {f"k{key}": row[key] / 1000 for key in ("bytes", "glb_bytes")}
+                         for row in rows if (row["scene"], row["method"]) == (scene, density)]  # fmt: skip
+                curve(panel, group, "kbytes", name, label=f"--density {density}", **style)
+                curve(panel, group, "kglb_bytes", name, color=style["color"], linestyle=":", linewidth=1.0,
+                      label="the same, whole GLB")  # fmt: skip
+            log_axes(panel)
+            panel.set_title(f"{scene}: {SETS[name]}")
+        panels[0].set_ylabel(ERROR)
+    grid[0][2].legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
+    for panel in grid[-1]:
+        panel.set_xlabel("bytes of the lightmap's EXR, thousands")
+    save(figure, folder, "bytes")
+
+
 def draw_elements(rows, folder):
     figure, panels = plt.subplots(1, 3, figsize=(13, 4.2), layout="constrained", sharex=True)
     shapes = dict(zip(POLICIES, "osD^"))
@@ -239,6 +262,8 @@ def draw(rows, peers, folder):
     rooms = parts.get(("desk",), []) + parts.get(("office",), [])
     if rooms:
         draw_rooms(rooms, peers, folder)
+    if ("bytes",) in parts:
+        draw_bytes(parts["bytes",], folder)
     if ("elements",) in parts:
         draw_elements(parts["elements",], folder)
     if ("blocker",) in parts:
