@@ -76,8 +76,8 @@ pub(super) struct LitTexel {
     /// What arrives from the emitter at hand, and whether its shadow's edge is near.
     now: DVec3,
     is_at_edge: bool,
-    /// Whether some emitter's shadow may fall between here and the next texel.
-    pub is_crossed: bool,
+    /// Luminance of the light that shadows between here and the next texel may hide or let through.
+    pub doubtful: f64,
 }
 
 /// What is done where a shadow's edge crosses a texel.
@@ -103,7 +103,7 @@ impl LitTexel {
             covering: Covering::Seen,
             now: DVec3::ZERO,
             is_at_edge: false,
-            is_crossed: false,
+            doubtful: 0.0,
         }
     }
 }
@@ -334,9 +334,13 @@ impl Shining<'_> {
         let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
         for texel in texels.iter_mut() {
             texel.now = self.irradiance(texel.point, Between::Polygons(between), &mut evaluation);
-            texel.is_crossed = true;
             let light = luminance(texel.now);
             (least, most) = (least.min(light), most.max(light));
+        }
+        if self.light.edges == Edges::Once {
+            let middle = texels[texels.len() / 2].point;
+            let unoccluded = luminance(self.irradiance(middle, Between::Nothing, &mut evaluation));
+            texels.iter_mut().for_each(|t| t.doubtful += unoccluded);
         }
         let mut samples = Vec::new();
         let is_bright = self.light.edges == Edges::Fitted && most > DIM * self.light.typical;

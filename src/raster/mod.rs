@@ -81,8 +81,8 @@ pub struct Lighting<'a> {
 pub struct PointLight {
     /// Irradiance.
     pub irradiance: DVec3,
-    /// Whether a shadow may fall between this point and the next.
-    pub is_crossed: bool,
+    /// Luminance of the light that shadows between this point and the next may hide or let through.
+    pub doubtful: f64,
 }
 
 /// What rasterizing took.
@@ -130,7 +130,7 @@ impl<'a> Lighting<'a> {
         for texel in &texels {
             let at = texel.cell[1] as usize * size.0 as usize + texel.cell[0] as usize;
             let irradiance = texel.direct + texel.indirect;
-            light[at] = Some(PointLight { irradiance, is_crossed: texel.is_crossed });
+            light[at] = Some(PointLight { irradiance, doubtful: texel.doubtful });
         }
         light
     }
