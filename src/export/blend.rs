@@ -7,6 +7,9 @@
 
 use super::accessor::{Component, Elements};
 
+/// A blend as something to compare and sort by.
+pub(super) type BlendKey = ([u32; 3], [u64; 3]);
+
 /// A vertex made of up to three vertices of the source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Blend {
@@ -47,7 +50,7 @@ impl Blend {
     }
 
     /// Something to compare and sort by.
-    pub(super) fn key(&self) -> ([u32; 3], [u64; 3]) {
+    pub(super) fn key(&self) -> BlendKey {
         (self.sources, self.weights.map(f64::to_bits))
     }
 
