@@ -271,6 +271,39 @@ fn few_triangles_are_added() {
     assert_eq!(output.json["accessors"][number(&indices["indices"])]["componentType"], 5123);
 }
 
+/// Where a cut ends on an edge that another surface has as well, both have the vertex, bit for bit: in
+/// another primitive, and around the corner of a cube.
+#[test]
+fn neighbours_take_the_cuts_of_their_edges() {
+    for cut in [Cut::Straight, Cut::Slanted, Cut::Eighths] {
+        let results = Results::of(quilt(false)).cut_up_some(cut, 5, 4, |surface| surface == 0);
+        let output = Output::of(&results);
+        let [quilt, wall] = [0, 1].map(|placement| {
+            let corners = written(&results, &output, placement).into_iter().flat_map(|t| t.places);
+            let shared = corners.filter(|p| p.y == 0.0 && p.z == 0.0).map(|p| p.x.to_bits());
+            shared.collect::<BTreeSet<_>>()
+        });
+        assert!(quilt.len() > 7, "{cut:?}: the quilt is cut at the wall");
+        assert_eq!(quilt, wall, "{cut:?}");
+
+        let results = Results::of(document()).cut_up_some(cut, 3, 4, |surface| surface == 2);
+        let output = Output::of(&results);
+        let cube = written(&results, &output, 0);
+        let places: Vec<DVec3> = cube.iter().flat_map(|t| t.places).collect();
+        assert!(places.iter().any(|p| p.abs().min_element() < 0.5 - FLOAT && p.abs().max_element() == 0.5));
+        for triangle in &cube {
+            for k in 0..3 {
+                let (a, b) = (triangle.places[k], triangle.places[(k + 1) % 3]);
+                let inside = places.iter().find(|p| {
+                    let share = (**p - a).dot(b - a) / (b - a).length_squared();
+                    share > 1e-6 && share < 1.0 - 1e-6 && p.distance(a.lerp(b, share)) < 1e-7
+                });
+                assert_eq!(inside, None, "{cut:?}: a vertex inside the edge from {a} to {b}");
+            }
+        }
+    }
+}
+
 #[test]
 fn bytes_of_cuts_repeat() {
     for topology in [Topology::Source, Topology::Adaptive] {

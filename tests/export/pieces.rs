@@ -37,10 +37,22 @@ pub(crate) enum Cut {
 
 impl Results {
     /// The same results with `2^depth` charts a surface, as a tree of cuts has them.
-    pub(crate) fn cut_up(mut self, cut: Cut, depth: u32, seed: u64) -> Self {
+    pub(crate) fn cut_up(self, cut: Cut, depth: u32, seed: u64) -> Self {
+        self.cut_up_some(cut, depth, seed, |_| true)
+    }
+
+    /// As [`Results::cut_up`], with one chart for each surface that is not among `some`.
+    pub(crate) fn cut_up_some(
+        mut self,
+        cut: Cut,
+        depth: u32,
+        seed: u64,
+        some: impl Fn(usize) -> bool,
+    ) -> Self {
         let mut numbers = Numbers::new(seed);
         let mut parts = Vec::new();
         for (index, surface) in self.surfaces.iter().enumerate() {
+            let depth = if some(index) { depth } else { 0 };
             for outline in outlines(surface, cut, depth, &mut numbers) {
                 parts.push((index, outline));
             }
@@ -155,7 +167,8 @@ pub(crate) fn quilt(even: bool) -> SourceDocument {
     let count = points.len();
     let sets = maker.view(&sets, Some(4));
     let colours = maker.view(&colours, Some(4));
-    let foot: Vec<[f32; 3]> = (0..=SIDE).flat_map(|i| [[at(i), 0.0, 0.0], [at(i), 0.0, 1.0]]).collect();
+    let row = points[..=SIDE].iter();
+    let foot: Vec<[f32; 3]> = row.flat_map(|p| [[p[0], 0.0, 0.0], [p[0], 0.0, 1.0]]).collect();
     let below: Vec<u16> =
         (0..SIDE as u16).flat_map(|i| [2 * i, 2 * i + 1, 2 * i + 3, 2 * i, 2 * i + 3, 2 * i + 2]).collect();
     let quilt = json!({
