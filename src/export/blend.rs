@@ -54,7 +54,8 @@ impl Blend {
         (self.sources, self.weights.map(f64::to_bits))
     }
 
-    fn parts(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+    /// The vertices and their weights.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         self.sources.into_iter().zip(self.weights).filter(|part| part.1 > 0.0)
     }
 

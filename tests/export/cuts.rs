@@ -304,6 +304,63 @@ fn neighbours_take_the_cuts_of_their_edges() {
     }
 }
 
+/// The radiosity mesh is cut alike, its solution interpolated.
+#[test]
+fn the_adaptive_mesh_is_cut_too() {
+    for cut in [Cut::Straight, Cut::Slanted, Cut::Eighths] {
+        let mut results = Results::of(document()).cut_up(cut, 4, 6);
+        results.options.topology = Topology::Adaptive;
+        let output = Output::of(&results);
+        let (document, ..) = gltf::import_slice(cobake::export::encode(&results.baked()).unwrap()).unwrap();
+        let mut numbers = Numbers::new(4);
+        for (placement, name) in [(2, "floor"), (3, "strip"), (4, "wall")] {
+            let node = document.nodes().find(|node| node.name() == Some(name)).unwrap();
+            let world = glam::Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4();
+            let mut written = written(&results, &output, placement);
+            for place in written.iter_mut().flat_map(|t| &mut t.places) {
+                *place = world.transform_point3(*place);
+            }
+            let attributes = &written_primitive(&results, &output, placement)["attributes"];
+            let places = output.floats(&attributes["POSITION"]);
+            for (place, light) in places.iter().zip(output.floats(&attributes["_IRRADIANCE"])) {
+                let meant = world.transform_point3(DVec3::from_slice(place)).abs() + 1.0;
+                assert!(
+                    DVec3::from_slice(&light).distance(meant) < FLOAT,
+                    "{cut:?}, {name}: {light:?}, {meant}"
+                );
+            }
+            for (index, surface) in results.surfaces.iter().enumerate().filter(|s| s.1.placement == placement)
+            {
+                let on = |t: &&Written| t.places.iter().all(|p| surface.frame.height(*p).abs() < FLOAT);
+                let own: Vec<&Written> = written.iter().filter(on).collect();
+                assert!(own.len() > 20, "{cut:?}, {name}: {} triangles", own.len());
+                let area: f64 = own.iter().map(|t| area_vector(t.places).dot(surface.frame.normal)).sum();
+                assert!((area - surface.area).abs() < FLOAT * area, "{cut:?}, {name}: {area} m²");
+                check_edges(&format!("{cut:?}, {name}"), &own);
+                let (low, high) = surface.extent();
+                for _ in 0..200 {
+                    let p = low + (high - low) * DVec2::new(numbers.next(), numbers.next());
+                    if from_border(&results, index, p) < 4.0 * FLOAT {
+                        continue;
+                    }
+                    let at =
+                        |t: &&&Written| weights(t.places, surface.frame.lift(p)).iter().all(|&w| w > 0.0);
+                    let over: Vec<_> = own.iter().filter(at).collect();
+                    if over.is_empty() {
+                        continue; // on an edge; that all is covered, the areas say
+                    }
+                    assert_eq!(over.len(), 1, "{cut:?}, {name}: triangles over {p}");
+                    let inside = weights(over[0].places, surface.frame.lift(p));
+                    let found: DVec2 = (0..3).map(|i| inside[i] * over[0].coordinates[i]).sum();
+                    let expected =
+                        results.atlas.chart_at(index, p).unwrap().texel(p) / f64::from(results.atlas.width);
+                    assert!(found.distance(expected) < FLOAT, "{cut:?}, {name}: {found} is not {expected}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn bytes_of_cuts_repeat() {
     for topology in [Topology::Source, Topology::Adaptive] {

@@ -10,12 +10,14 @@
 mod borders;
 mod divide;
 mod edges;
+mod mesh;
 mod scene;
 
 use glam::DVec2;
 
 pub(super) use borders::Borders;
 pub(super) use edges::Edges;
+pub(super) use mesh::ChartedMesh;
 pub(super) use scene::Cuts;
 
 use self::divide::{Division, divide};
