@@ -261,6 +261,7 @@ impl Facet {
             cob: Cob::UNINITIALIZED,
             direct: Shading::default(),
             indirect: Shading::default(),
+            is_uneven: false,
         });
         Some((self.elements.len() - 1) as u32)
     }

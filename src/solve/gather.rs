@@ -160,6 +160,9 @@ impl Gathering<'_> {
                 Shading { corners: [gathered.irradiance; 4], bulge: DVec3::ZERO };
             return;
         }
+        if e.is_uneven {
+            return self.receive_in_parts(element);
+        }
         let samples = e.samples;
         let places = samples.map(|sample| self.sample(sample));
         let values = places.map(|p| p.irradiance);
@@ -180,11 +183,16 @@ impl Gathering<'_> {
             if let Some(middle) = middle {
                 self.hand_down(element, middle);
             }
-            for child in self.facet.elements[element as usize].children() {
-                self.receive(child);
-            }
+            self.facet.elements[element as usize].is_uneven = true;
+            self.receive_in_parts(element);
         } else {
             self.facet.elements[element as usize].indirect = shading;
+        }
+    }
+
+    fn receive_in_parts(&mut self, element: u32) {
+        for child in self.facet.elements[element as usize].children() {
+            self.receive(child);
         }
     }
 
