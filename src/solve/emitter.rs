@@ -245,6 +245,21 @@ impl Emitter {
         }
     }
 
+    /// No place in `block` is nearer to it than this, metres.
+    #[must_use]
+    pub fn distance(&self, block: Bounds) -> f64 {
+        let own = match self {
+            Self::Area(area) => Bounds::of(area.hull.iter().copied()),
+            Self::Punctual(light) => match light.kind {
+                PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {
+                    Bounds::of([position])
+                }
+                PunctualKind::Directional { .. } => return f64::INFINITY,
+            },
+        };
+        (own.min - block.max).max(block.min - own.max).max(DVec3::ZERO).length()
+    }
+
     /// The shaft from a convex receiving polygon to the emitter.
     #[must_use]
     pub fn shaft(&self, receiver: &[DVec3], tracer: &Tracer) -> Shaft {

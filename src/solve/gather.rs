@@ -27,7 +27,7 @@ use crate::element::{Facet, Shading};
 use crate::geom::Frame;
 use crate::light::luminance;
 use crate::options::Refine;
-use crate::trace::FanStack;
+use crate::trace::{FanStack, Hit};
 
 /// In the dark, errors are measured by this fraction of the scene's mean light.
 pub(super) const LEAST_REFERENCE: f64 = 0.5;
@@ -176,7 +176,7 @@ impl Gathering<'_> {
                 shading = self.facet.elements[element as usize].shading(values, gathered.irradiance);
                 middle = Some(gathered);
             }
-            is_uneven = is_uneven || self.is_missed_under_cover(element, &shading);
+            is_uneven = is_uneven || self.is_missed_nearby(element, &shading);
         }
         if is_uneven && self.part(element, values) {
             self.places.resize(self.facet.samples.len(), None);
@@ -210,21 +210,37 @@ impl Gathering<'_> {
             let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
             error = differences.map(|d| NEAR_SHARE * d).fold(error, f64::max);
         }
-        error > self.tolerated(element, e.centroid, middle)
+        error > self.tolerated(element, e.centroid, middle.irradiance)
     }
 
-    /// Whether something stands close over the element where its light is not what `shading` says.
-    fn is_missed_under_cover(&mut self, element: u32, shading: &Shading) -> bool {
-        let Some(p) = self.nearby.most_covered(self.pass.tracer, self.facet, element) else { return false };
-        let gathered = self.at(self.facet.receiving(p));
+    /// Whether something stands close over the element, or on it, where its light is not what `shading` says.
+    fn is_missed_nearby(&mut self, element: u32, shading: &Shading) -> bool {
+        let tracer = self.pass.tracer;
+        self.nearby.look(tracer, self.facet, element);
+        let covered = self.nearby.most_covered(tracer, self.facet, element);
+        if covered.is_some_and(|p| self.is_missed_at(p, element, shading)) {
+            return true;
+        }
+        let field = self.source.field;
+        let reflected = |hit: &Hit, at| luminance(field.radiosity(tracer, hit, at).as_dvec3());
+        let foot = self.nearby.brightest_foot(tracer, self.facet, element, reflected);
+        foot.is_some_and(|foot| {
+            let e = &self.facet.elements[element as usize];
+            foot.gives > self.tolerated(element, foot.place, shading.at(e.place(foot.place)))
+                && self.is_missed_at(foot.place, element, shading)
+        })
+    }
+
+    fn is_missed_at(&mut self, p: DVec2, element: u32, shading: &Shading) -> bool {
+        let gathered = self.at(self.facet.receiving(p)).irradiance;
         let shading = shading.at(self.facet.elements[element as usize].place(p));
-        luminance((shading - gathered.irradiance).abs()) > self.tolerated(element, p, gathered)
+        luminance((shading - gathered).abs()) > self.tolerated(element, p, gathered)
     }
 
     /// The error that is tolerated at a place of an element.
-    fn tolerated(&self, element: u32, p: DVec2, gathered: Gathered) -> f64 {
+    fn tolerated(&self, element: u32, p: DVec2, gathered: DVec3) -> f64 {
         let (direct, _) = self.facet.received(element, p);
-        let light = luminance(direct + gathered.irradiance);
+        let light = luminance(direct + gathered);
         self.round.tolerance * light.max(LEAST_REFERENCE * self.pass.typical)
     }
 
