@@ -161,6 +161,17 @@ impl Facet {
         (direct / area, indirect / area)
     }
 
+    /// Multiplies what `element` and its parts received by reflection.
+    pub fn scale_indirect(&mut self, element: u32, scale: DVec3) {
+        let mut stack = vec![element];
+        while let Some(at) = stack.pop() {
+            let e = &mut self.elements[at as usize];
+            e.indirect.corners.iter_mut().for_each(|c| *c *= scale);
+            e.indirect.bulge *= scale;
+            stack.extend(e.children());
+        }
+    }
+
     /// The leaves that `element` is split into, or itself.
     #[must_use]
     pub fn leaves_of(&self, element: u32) -> Vec<u32> {

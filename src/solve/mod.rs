@@ -170,7 +170,7 @@ fn gather_reflected(
     let mut counts = GatherCounts::default();
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
     let texels = area / pass.indirect_threshold.powi(2);
-    let mut run = |round: Round, done: f64| {
+    let mut run = |round: Round, done: f64, facets: &mut [Facet]| {
         let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
         let hot_spots = hot.emitters(&field, facets);
         let source = Source { field: &field, hot_spots: &hot_spots, directions: &directions };
@@ -185,22 +185,28 @@ fn gather_reflected(
         counts.add(&own);
         progress(done).then_some(own)
     };
+    let mut run_and_settle = |round: Round, done: f64, facets: &mut [Facet]| {
+        let before = patches.mean_indirect(facets);
+        let counts = run(round, done, facets)?;
+        patches.settle(&before, facets);
+        Some(counts)
+    };
     let error = match pass.options.gather_error {
         Some(error) => {
-            run(Round::first(error), 0.8)?;
+            run_and_settle(Round::first(error), 0.8, facets)?;
             error
         }
         None => {
             let mut round = Round::first(COARSEST);
-            let mut error = affordable_error(&run(round, 0.75)?.contrasts, round, texels);
+            let mut error = affordable_error(&run_and_settle(round, 0.75, facets)?.contrasts, round, texels);
             if error < 0.5 * COARSEST {
                 round = Round::first(error);
-                error = affordable_error(&run(round, 0.8)?.contrasts, round, texels);
+                error = affordable_error(&run_and_settle(round, 0.8, facets)?.contrasts, round, texels);
             }
             error
         }
     };
-    run(Round::last(error), 1.0)?;
+    run(Round::last(error), 1.0, facets)?;
     Some((counts, error))
 }
 

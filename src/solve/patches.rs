@@ -20,6 +20,15 @@ use crate::trace::Tracer;
 /// What emitters sent is scaled by no more than this to close the energy balance.
 const MOST_SCALING: f64 = 2.0;
 
+/// After a round of gathering light is scaled by no more than this to bring it to balance.
+const MOST_SETTLING: f64 = 2.0;
+
+/// Changes are followed until this fraction of them is left,
+const LEFT_UNSETTLED: f64 = 0.01;
+
+/// or they were reflected so many times.
+const MOST_REFLECTIONS: u32 = 24;
+
 /// A patch: an element that shoots.
 #[derive(Clone, Debug)]
 pub struct Patch {
@@ -219,6 +228,57 @@ impl Patches {
         self.energy.absorbed += absorbed + shot * onto_backs;
         self.energy.escaped += shot * escaping;
         self.shots += 1;
+    }
+
+    /// Mean indirect irradiance of each patch as its elements have it.
+    #[must_use]
+    pub fn mean_indirect(&self, facets: &[Facet]) -> Vec<DVec3> {
+        self.patches.par_iter().map(|p| facets[p.facet as usize].mean(p.element).1).collect()
+    }
+
+    /// Brings the elements' reflected light closer to balance after a round of gathering, before which the patches
+    /// had `before` of it.
+    ///
+    /// A round carries light on by one reflection only. What it changed will be reflected, too, and again: the
+    /// patches tell how much of that arrives where, coarsely, and the elements' light is scaled so that each patch
+    /// has it (a two-grid iteration: Brandt, "Multi-Level Adaptive Solutions to Boundary-Value Problems", 1977).
+    /// Dark gaps stay dark.
+    pub fn settle(&self, before: &[DVec3], facets: &mut [Facet]) {
+        let after = self.mean_indirect(facets);
+        let changes: Vec<DVec3> = after.iter().zip(before).map(|(a, b)| *a - *b).collect();
+        let to_come = self.all_that_follows(changes);
+        for ((patch, after), more) in self.patches.iter().zip(after).zip(to_come) {
+            let scale = DVec3::select(after.cmpgt(DVec3::ZERO), (after + more) / after, DVec3::ONE);
+            let scale = scale.clamp(DVec3::splat(1.0 / MOST_SETTLING), DVec3::splat(MOST_SETTLING));
+            facets[patch.facet as usize].scale_indirect(patch.element, scale);
+        }
+    }
+
+    /// What arrives at each patch when all reflect `changes` of their irradiance, once and again.
+    fn all_that_follows(&self, changes: Vec<DVec3>) -> Vec<DVec3> {
+        let power = |changes: &[DVec3]| -> f64 {
+            let of = |(p, c): (&Patch, &DVec3)| p.area * c.abs().element_sum();
+            self.patches.iter().zip(changes).map(of).sum()
+        };
+        let enough = LEFT_UNSETTLED * power(&changes);
+        let (mut sum, mut now) = (vec![DVec3::ZERO; changes.len()], changes);
+        for _ in 0..MOST_REFLECTIONS {
+            // Factors are symmetric but for the remainders, which are close to 1: a patch gathers what others send.
+            now = self
+                .patches
+                .par_iter()
+                .enumerate()
+                .map(|(i, patch)| {
+                    let arriving = |(j, g): (usize, f64)| self.patches[j].reflectance * now[j] * g;
+                    self.exchange.received(i).map(arriving).sum::<DVec3>() / patch.area
+                })
+                .collect();
+            sum.iter_mut().zip(&now).for_each(|(sum, now)| *sum += *now);
+            if power(&now) <= enough {
+                break;
+            }
+        }
+        sum
     }
 
     /// Writes what patches received by reflection into their elements, continuous where it was constant: a
