@@ -262,6 +262,7 @@ impl Facet {
             direct: Shading::default(),
             indirect: Shading::default(),
             is_uneven: false,
+            is_enclosed: false,
         });
         Some((self.elements.len() - 1) as u32)
     }

@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 
 use glam::{DVec2, DVec3};
 
-use crate::element::{Element, Facet};
+use crate::element::Facet;
 use crate::geom::polygon::{clip_half_plane, clip_rectangle, signed_area};
 use crate::geom::{Bounds, Ring};
 use crate::trace::{Hit, Tracer};
@@ -95,7 +95,9 @@ impl Nearby {
         let e = &facet.elements[element as usize];
         let mut most: Option<BrightFoot> = None;
         for (triangle, corners) in self.triangles(tracer, facet) {
-            let Some(foot) = foot(corners, e, tracer.margin()) else { continue };
+            let Some(foot) = foot(corners, (e.min, e.max), e.cut.is_some(), tracer.margin()) else {
+                continue;
+            };
             let at = facet.frame.lift(foot.middle.truncate()) + facet.frame.normal * foot.middle.z;
             for from_behind in [false, true] {
                 let hit = Hit { triangle: triangle as usize, distance: 0.0, from_behind };
@@ -128,15 +130,15 @@ struct Foot {
     share: f64,
 }
 
-/// The foot of a triangle's part over `e`; `None` where it is not upright, not there, or along an edge that has
-/// samples at both ends.
-fn foot([a, b, c]: [DVec3; 3], e: &Element, margin: f64) -> Option<Foot> {
+/// The foot of a triangle's part over the rectangle from `low` to `high`, no higher than that is large; `None` where
+/// it is not upright, not there, or along an edge that has samples at both ends, as all have but for those that `is_cut`.
+fn foot([a, b, c]: [DVec3; 3], (low, high): (DVec2, DVec2), is_cut: bool, margin: f64) -> Option<Foot> {
     let normal = (b - a).cross(c - a).try_normalize()?;
     let front = normal.truncate().try_normalize()?;
     if normal.z.abs() > UPRIGHT {
         return None;
     }
-    let (min, max) = (e.min.extend(-margin), e.max.extend(e.size()));
+    let (min, max) = (low.extend(-margin), high.extend((high - low).max_element()));
     let mut part = vec![a, b, c];
     for axis in 0..3 {
         part = clip(&clip(&part, axis, 1.0, min[axis] - margin), axis, -1.0, -max[axis] - margin);
@@ -158,10 +160,10 @@ fn foot([a, b, c]: [DVec3; 3], e: &Element, margin: f64) -> Option<Foot> {
     }
     let middle = slice.iter().sum::<DVec3>() / slice.len() as f64;
     let is_at_edge = (0..2).any(|axis| {
-        let to_edge = (middle[axis] - e.min[axis]).abs().min((e.max[axis] - middle[axis]).abs());
-        to_edge < 2.0 * margin && length > ALONG_EDGE * (e.max - e.min)[1 - axis]
+        let to_edge = (middle[axis] - low[axis]).abs().min((high[axis] - middle[axis]).abs());
+        to_edge < 2.0 * margin && length > ALONG_EDGE * (high - low)[1 - axis]
     });
-    if e.cut.is_none() && is_at_edge {
+    if !is_cut && is_at_edge {
         return None;
     }
     let share = 0.5 * (1.0 - lowest / highest) * (length / highest).min(1.0);
@@ -207,6 +209,26 @@ fn cover([a, b, c]: [DVec3; 3], (min, max): (DVec3, DVec3)) -> (Ring, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The side of a box on an element: its foot is where it stands, and it fills nearly half of what is seen there.
+    #[test]
+    fn an_upright_side_has_a_foot() {
+        let ground = (DVec2::ZERO, DVec2::splat(2.0));
+        let side =
+            |y: f64, z: f64| [DVec3::new(0.5, y, z), DVec3::new(1.5, y, z), DVec3::new(1.5, y, z + 0.5)];
+        let at = foot(side(0.8, 0.0), ground, false, 1e-6).unwrap();
+        assert!((at.middle.y - 0.8).abs() < 1e-9 && at.middle.x > 0.5 && at.middle.x < 1.5, "{at:?}");
+        assert!(at.lowest == 0.0 && at.front == -DVec2::Y && (at.share - 0.5).abs() < 1e-9, "{at:?}");
+        // What hovers gives less.
+        let hovering = foot(side(0.8, 0.5), ground, false, 1e-6).unwrap();
+        assert!((hovering.lowest - 0.5).abs() < 1e-9 && hovering.share < 0.3, "{hovering:?}");
+        // What lies flat, stands beside or stands all along an edge has none that corners do not know.
+        let flat = side(0.8, 0.0).map(|p| DVec3::new(p.x, p.z, p.y));
+        assert!(foot(flat, ground, false, 1e-6).is_none());
+        assert!(foot(side(2.5, 0.0), ground, false, 1e-6).is_none());
+        let wall = [DVec3::new(-9.0, 0.0, 0.0), DVec3::new(9.0, 0.0, 0.0), DVec3::new(0.0, 0.0, 9.0)];
+        assert!(foot(wall, ground, false, 1e-6).is_none() && foot(wall, ground, true, 1e-6).is_some());
+    }
 
     #[test]
     fn what_reaches_out_of_the_box_is_cut() {

@@ -341,3 +341,17 @@ const NEAR_SHARE: f64 = 0.05;
 /// Where occluders are about, corners may differ from the middle by this fraction of the light before the
 /// element is split: the interpolation of a shadow's edge can be right in the middle by chance.
 const SHADOW_SPREAD: f64 = 0.25;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half of the light of two corners and none at the others is right in the middle whatever lies between.
+    #[test]
+    fn near_an_emitter_a_middle_that_is_right_is_not_believed() {
+        let [half, spread] = [DVec3::splat(50.0), DVec3::splat(50.0)];
+        let of = |is_near| Arriving { middle: half, interpolated: half, spread: luminance(spread), is_near };
+        assert!(of(false).error() < 1e-9);
+        assert!(of(true).error() > GRADIENT_TOLERANCE * luminance(half));
+    }
+}

@@ -426,6 +426,13 @@ mod tests {
     }
 
     #[test]
+    fn distances_are_between_the_nearest_places() {
+        let block = Bounds { min: DVec3::new(0.8, -1.0, 0.0), max: DVec3::new(2.0, 1.0, 1.6) };
+        // 0.3 to the side of the lamp's edge and 0.4 below it.
+        assert!((Emitter::Area(lamp()).distance(block) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
     fn punctual_lights_follow_their_laws() {
         let light = |kind| PunctualLight { kind, intensity: DVec3::splat(8.0), node: 0 };
         let position = DVec3::new(0.0, 0.0, 2.0);
