@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 
 use cobake::options::Topology;
+use cobake::raster::Lightmap;
 use glam::{DVec2, DVec3};
 use serde_json::Value;
 
 use crate::fixture::{Results, document, vectors};
 use crate::pieces::{Cut, Numbers, quilt};
-use crate::{Output, number};
+use crate::{Output, damage, number};
 
 /// 32-bit positions and texture coordinates of order 1, and what borders bend to meet vertices.
 const FLOAT: f64 = 4e-6;
@@ -372,4 +373,42 @@ fn bytes_of_cuts_repeat() {
         let first = encode();
         assert!((0..3).all(|_| encode() == first));
     }
+}
+
+/// Outlines that are none, and documents with a number that is nonsense, end in a file or an error.
+#[test]
+fn bad_cuts_never_panic() {
+    let changes: [fn(&mut Vec<DVec2>); 6] = [
+        Vec::clear,
+        |ring| ring.truncate(2),
+        |ring| ring[0] = DVec2::NAN,
+        |ring| ring[1] = DVec2::INFINITY,
+        |ring| ring.reverse(),
+        |ring| ring.iter_mut().for_each(|p| *p *= 1e-30),
+    ];
+    for topology in [Topology::Source, Topology::Adaptive] {
+        for change in changes {
+            let mut results = Results::of(quilt(false)).cut_up(Cut::Slanted, 3, 2);
+            results.options.topology = topology;
+            results.atlas.charts.iter_mut().step_by(2).for_each(|chart| change(&mut chart.outline));
+            Output::of(&results);
+        }
+    }
+    let mut results = Results::of(quilt(false)).cut_up(Cut::Slanted, 2, 2);
+    results.lightmap = Lightmap { width: 1, height: 1, texels: vec![[1.0; 3]] };
+    let whole = results.scene.source.json.clone();
+    let (mut written, mut refused) = (0, 0);
+    for by in [0.into(), 3.into(), (-1).into(), 1_000_000.into()] {
+        for number in 0.. {
+            results.scene.source.json = whole.clone();
+            if !damage(&mut results.scene.source.json, &mut { number }, &by) {
+                break;
+            }
+            match cobake::export::encode(&results.baked()) {
+                Ok(_) => written += 1,
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    assert!(written > 20 && refused > 20, "{written} written, {refused} refused");
 }
