@@ -118,6 +118,12 @@ impl<'a> Lighting<'a> {
         self.input.surfaces
     }
 
+    /// How many emitters light the surfaces.
+    #[must_use]
+    pub fn emitters(&self) -> usize {
+        self.input.emitters.len()
+    }
+
     /// The irradiance at the texel centres of a page of `size` texels that `chart` alone lies in, row by row;
     /// `None` where nothing of the surface that is seen is near.
     #[must_use]
