@@ -206,7 +206,7 @@ fn gather_reflected(
                 }
             }
         }
-        patches.settle(&before, facets);
+        patches.settle(&before, round.tolerance, facets);
         progress(done).then_some(own.contrasts)
     };
     let error = match pass.options.gather_error {

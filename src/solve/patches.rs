@@ -23,6 +23,9 @@ const MOST_SCALING: f64 = 2.0;
 /// After a round of gathering light is scaled by no more than this to bring it to balance.
 const MOST_SETTLING: f64 = 2.0;
 
+/// A gain by less than this share of the tolerance may be the rays' own error.
+const GAIN_BY_CHANCE: f64 = 1.0 / 3.0;
+
 /// Changes are followed until this fraction of them is left,
 const LEFT_UNSETTLED: f64 = 0.01;
 
@@ -242,14 +245,24 @@ impl Patches {
     /// A round carries light on by one reflection only. What it changed will be reflected, too, and again: the
     /// patches tell how much of that arrives where, coarsely, and the elements' light is scaled so that each patch
     /// has it (a two-grid iteration: Brandt, "Multi-Level Adaptive Solutions to Boundary-Value Problems", 1977).
-    /// What changed in narrow gaps does not come out of them and is left out.
-    pub fn settle(&self, before: &[Vec<Shading>], facets: &mut [Facet]) {
+    /// What changed in narrow gaps does not come out of them and is left out, as is a loss of less than
+    /// the round's `tolerance`, a fraction of the light: patches lose no light, interpolation does, and a loss carried
+    /// on would grow.
+    pub fn settle(&self, before: &[Vec<Shading>], tolerance: f64, facets: &mut [Facet]) {
         let open: Vec<OpenLight> = self
             .patches
             .par_iter()
             .map(|p| OpenLight::of(&facets[p.facet as usize], p.element, &before[p.facet as usize]))
             .collect();
-        let changes = open.iter().zip(&self.patches).map(|(o, p)| o.change / p.area).collect();
+        let changes = open
+            .iter()
+            .zip(&self.patches)
+            .map(|(open, patch)| {
+                let gain = (open.change - GAIN_BY_CHANCE * tolerance * open.light).max(DVec3::ZERO);
+                let loss = (-open.change - tolerance * open.light).max(DVec3::ZERO);
+                (gain - loss) / patch.area
+            })
+            .collect();
         for ((patch, open), more) in self.patches.iter().zip(&open).zip(self.all_that_follows(changes)) {
             let more = more * open.area;
             let scale = DVec3::select(open.light.cmpgt(DVec3::ZERO), 1.0 + more / open.light, DVec3::ONE);
