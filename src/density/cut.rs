@@ -20,7 +20,7 @@ const CUTS: usize = 24;
 const DEEPEST: u32 = 24;
 
 /// What a chart costs beside its texels, in texels: the vertices that cutting adds.
-const CHART: f64 = 40.0;
+const CHART: f64 = 12.0;
 
 /// Spacings that are tried within a halving.
 const STEPS: usize = 2;

@@ -27,8 +27,12 @@ const BLIND_SPACING: f64 = 1.0;
 /// The mean squared error that light in doubt is taken to hide, as a fraction of its square.
 const DOUBT: f64 = 0.02;
 
-/// Samples for each texel, at most.
-const SAMPLES_A_TEXEL: f64 = 1.5;
+/// Samples for each texel, at most: the cheaper they are the more,
+const MOST_SAMPLES: f64 = 2.5;
+/// and never fewer;
+const LEAST_SAMPLES: f64 = 1.2;
+/// between these so many for each emitter that they have to ask.
+const SAMPLES_BY_EMITTERS: f64 = 10.0;
 
 /// How often it is decided anew where to look closer.
 const ROUNDS: u32 = 10;
@@ -77,7 +81,8 @@ pub(super) fn survey(lighting: &Lighting, options: DensityOptions) -> Surveys {
         tiles.par_iter().map(|tile| tile.look(lighting)).collect::<Vec<_>>().into_iter().flatten().collect()
     };
     let mut quarters = look(&tiles);
-    let budget = (SAMPLES_A_TEXEL * options.texels) as u64;
+    let by_cost = SAMPLES_BY_EMITTERS / (1 + lighting.emitters()) as f64;
+    let budget = (by_cost.clamp(LEAST_SAMPLES, MOST_SAMPLES) * options.texels) as u64;
     let mut left = budget;
 
     let mut price = 0.0;

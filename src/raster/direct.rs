@@ -17,8 +17,8 @@ use super::coverage::TexelSite;
 use super::fit::{FitTexel, LightSample, fit};
 use super::penumbra::{SmoothBlock, is_soft};
 use super::ways::TexelWays;
-use crate::geom::polygon::{contains, nearest_on_segment, rectangle};
-use crate::geom::{Bounds, Frame};
+use crate::geom::polygon::{contains, is_in_convex, nearest_on_segment, rectangle};
+use crate::geom::{Bounds, Frame, Ring};
 use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
@@ -133,8 +133,9 @@ impl DirectLight<'_> {
         let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
         let plane_from_texel = chart.texel_from_plane.inverse();
         let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
+        let outline = &chart.outline;
         for emitter in self.emitters {
-            let work = Shining { light: self, surface, plane_from_texel, cover, emitter };
+            let work = Shining { light: self, surface, outline, plane_from_texel, cover, emitter };
             let extent = extent(texels);
             let done = work.shine_on(texels, extent, Inherited { between: None, texels: usize::MAX });
             ways.add(&done.ways);
@@ -206,6 +207,8 @@ pub(super) fn texel_steps(chart: &Chart) -> [DVec2; 2] {
 struct Shining<'a> {
     light: &'a DirectLight<'a>,
     surface: &'a Surface,
+    /// What of the surface the chart shows.
+    outline: &'a Ring,
     plane_from_texel: DAffine2,
     cover: Cover<'a>,
     emitter: &'a Emitter,
@@ -392,7 +395,8 @@ impl Shining<'_> {
             let point = self.plane_from_texel.transform_point2(at);
             let is_inside = (outlines.is_empty() && !rings.is_empty())
                 || (contains(rings, point) && !self.is_at_outline(outlines, point));
-            if is_inside && !self.cover.hides(point) {
+            // What lies beyond a cut is another chart's.
+            if is_inside && is_in_convex(self.outline, point) && !self.cover.hides(point) {
                 let light = self.irradiance(point, Between::Polygons(between), evaluation);
                 samples.push(LightSample { at, light });
             }

@@ -12,6 +12,7 @@ mod direct;
 mod fit;
 mod locate;
 mod penumbra;
+mod seams;
 mod ways;
 
 use std::f64::consts::PI;
@@ -35,6 +36,7 @@ pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
 use direct::{DirectLight, Edges, LitTexel, texel_steps};
 use locate::TriangleLocator;
+pub use seams::SeamReport;
 pub use ways::TexelWays;
 
 /// A finished lightmap page.
@@ -98,6 +100,8 @@ pub struct TexelCounts {
     pub ways: TexelWays,
     /// Evaluations of direct light and rays, emitters times points.
     pub effort: Effort,
+    /// How well the charts agree where they meet.
+    pub seams: SeamReport,
 }
 
 impl<'a> Lighting<'a> {
@@ -112,6 +116,12 @@ impl<'a> Lighting<'a> {
     #[must_use]
     pub fn surfaces(&self) -> &'a [Surface] {
         self.input.surfaces
+    }
+
+    /// How many emitters light the surfaces.
+    #[must_use]
+    pub fn emitters(&self) -> usize {
+        self.input.emitters.len()
     }
 
     /// The irradiance at the texel centres of a page of `size` texels that `chart` alone lies in, row by row;
@@ -187,6 +197,7 @@ pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> (Lightmap, TexelCounts) 
             valid[at] = true;
         }
     }
+    counts.seams = seams::join(input.surfaces, atlas, &mut texels, &valid);
     tracing::debug!(?counts, "texels");
     let before = valid.iter().filter(|&&v| v).count();
     dilate(&mut texels, &mut valid, size, atlas.padding);
