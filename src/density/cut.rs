@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::survey::Surveys;
 use super::{Cell, DensityOptions, LEVELS, SurfaceSurvey};
-use crate::geom::polygon::{orient, rectangle, signed_area};
+use crate::geom::polygon::{orient, rectangle};
 use crate::surface::Surface;
 use crate::unwrap::{Part, clip};
 
@@ -45,24 +45,7 @@ pub(super) fn cut(surfaces: &[Surface], surveys: &Surveys, options: DensityOptio
         }
     }
     let parts = leaves.into_iter().zip(surfaces).enumerate();
-    let mut parts: Vec<Part> =
-        parts.flat_map(|(index, (leaves, surface))| parts_of(index, surface, &leaves)).collect();
-    relate_to_mean(&mut parts);
-    parts
-}
-
-/// Divides the weights by their mean, so that a density for all is the mean one.
-fn relate_to_mean(parts: &mut [Part]) {
-    let (mut texels, mut area) = (0.0, 0.0);
-    for part in parts.iter() {
-        let own = signed_area(&part.outline);
-        area += own;
-        texels += own * part.weight.element_product();
-    }
-    let mean = (texels / area).sqrt();
-    if mean > 0.0 && mean.is_finite() {
-        parts.iter_mut().for_each(|part| part.weight /= mean);
-    }
+    parts.flat_map(|(index, (leaves, surface))| parts_of(index, surface, &leaves)).collect()
 }
 
 /// The trees of all surfaces.
