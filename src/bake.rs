@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
-use crate::export::{Baked, encode, lightmap_bytes};
+use crate::export::{Baked, encode};
 use crate::options::BakeOptions;
 use crate::progress::{Progress, Stage};
-use crate::raster::{Lighting, Lightmap, RasterInput, rasterize};
+use crate::raster::{Lighting, Lightmap, RasterInput};
 use crate::report::{Recorder, Report};
 use crate::retriangulate::RadiosityMesh;
 use crate::retriangulate::mesh::radiosity_mesh;
@@ -18,11 +18,15 @@ use crate::solve::{Problem, Solution, solve};
 use crate::surface::{Geometry, Surface, build_surfaces};
 use crate::trace::Tracer;
 use crate::unwrap::Atlas;
+use page::{Page, PageMaker};
 use scale::Scale;
+use written::Written;
 
 mod account;
+mod budget;
 mod page;
 mod scale;
+mod written;
 
 /// Samples keep this fraction of the scene's diagonal from outlines.
 const NUDGE: f64 = 1e-5;
@@ -135,10 +139,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         options,
     };
     let lighting = Lighting::new(&raster_input);
-    let atlas = page::lay_out(&lighting, options, scale.texel)?;
-
-    enter(&mut recorder, Stage::Raster)?;
-    let (lightmap, texels) = rasterize(&lighting, &atlas);
+    let Page { atlas, lightmap, texels } =
+        PageMaker::new(&lighting, options, scale.texel).page(&mut recorder)?;
 
     enter(&mut recorder, Stage::Export)?;
     let glb = encode(&Baked {
@@ -153,7 +155,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     report.elements.initial = initial;
     account::fill_report(&mut report, scene, &surfaces, &solution);
     account::fill_texels(&mut report, &atlas, texels);
-    report.lightmap.bytes = lightmap_bytes(&glb);
+    let written = Written::in_document(&glb);
+    (report.lightmap.bytes, report.lightmap.png_bytes) = (written.exr, written.png);
     recorder.finish(&mut report);
     drop(appearance);
     let Solution { facets, .. } = solution;

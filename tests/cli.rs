@@ -12,8 +12,9 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 22] = [
+const OPTIONS: [&str; 23] = [
     "--output",
+    "--budget",
     "--size",
     "--texels-per-metre",
     "--threads",

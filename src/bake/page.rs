@@ -1,13 +1,19 @@
 //! From the light to a page: where texels are dense, where charts lie, and what the texels hold.
 
-use crate::density::{DensityOptions, apportion};
+use crate::density::{DensityOptions, LightSurvey};
+use crate::error::Error;
 use crate::options::{BakeOptions, DensityPolicy, Resolution};
-use crate::raster::Lighting;
+use crate::progress::Stage;
+use crate::raster::{Lighting, Lightmap, TexelCounts, rasterize};
+use crate::report::Recorder;
 use crate::surface::Surface;
 use crate::unwrap::{Atlas, Part, Room, UnwrapError, UnwrapOptions, unwrap, weighed_area, whole};
 
+use super::budget::{self, texels_for};
+use super::enter;
+
 /// The share of a page that charts and their padding fill.
-const FILLED: f64 = 0.95;
+pub(super) const FILLED: f64 = 0.95;
 
 /// The share of a page's texels that charts cover, about, where light decides on density.
 const COVERED: f64 = 0.8;
@@ -16,35 +22,114 @@ const COVERED: f64 = 0.8;
 /// more texels than the light asks for only make the file larger.
 const SPARE: f64 = 1.25;
 
-/// Lays the charts out.
-pub(super) fn lay_out(lighting: &Lighting, options: &BakeOptions, texel: f64) -> Result<Atlas, UnwrapError> {
-    let surfaces = lighting.surfaces();
-    let room = match options.resolution {
-        Resolution::Size(side) => Room::Square(side),
-        Resolution::TexelsPerMetre(density) => Room::Density(density),
-    };
-    let mut unwrapping = UnwrapOptions { padding: options.padding, ..UnwrapOptions::new(room) };
-    match options.density {
-        DensityPolicy::Uniform => unwrap(surfaces, &whole(surfaces), &unwrapping),
-        DensityPolicy::Light => {
-            let (texels, longest) = match room {
-                Room::Square(side) => (FILLED * f64::from(side).powi(2), f64::from(side) - 1.0),
-                Room::Density(density) => {
-                    let area: f64 = surfaces.iter().map(|s| s.area).sum();
-                    let texels = area * density * density / COVERED;
-                    (texels, 1.5 * texels.sqrt())
-                }
-                Room::Texels(texels) => (texels, 1.5 * texels.sqrt()),
-            };
-            let padding = options.padding.unwrap_or(1);
-            let density = DensityOptions { texels, longest, padding, uniform_texel: texel };
-            let mut parts = apportion(lighting, density).parts;
-            let mean = normalize(surfaces, &mut parts);
-            if let Room::Square(_) = room {
-                unwrapping.most = Some(SPARE * mean);
-            }
-            unwrap(surfaces, &parts, &unwrapping)
+/// No chart is longer than this many times the side of a square page, where the page may take any shape.
+const LONGEST: f64 = 1.5;
+
+/// A finished page.
+pub(super) struct Page {
+    pub(super) atlas: Atlas,
+    pub(super) lightmap: Lightmap,
+    pub(super) texels: TexelCounts,
+}
+
+/// Makes pages of one solution.
+pub(super) struct PageMaker<'a> {
+    lighting: &'a Lighting<'a>,
+    options: &'a BakeOptions,
+    /// A texel's side if all were alike, metres.
+    texel: f64,
+    /// Where the light needs texels, if it decides; it is asked once, for about the texels that are expected.
+    survey: Option<LightSurvey>,
+}
+
+impl<'a> PageMaker<'a> {
+    pub(super) fn new(lighting: &'a Lighting<'a>, options: &'a BakeOptions, texel: f64) -> Self {
+        let mut maker = Self { lighting, options, texel, survey: None };
+        if options.density == DensityPolicy::Light {
+            let density = maker.density(maker.room());
+            maker.survey = Some(LightSurvey::of(lighting, density));
         }
+        maker
+    }
+
+    /// The page that the options ask for.
+    pub(super) fn page(&self, recorder: &mut Recorder) -> Result<Page, Error> {
+        match self.options.resolution {
+            Resolution::Bytes(bytes) => budget::within(self, bytes, recorder),
+            _ => self.page_of(self.room(), recorder),
+        }
+    }
+
+    /// A page of that size.
+    pub(super) fn page_of(&self, room: Room, recorder: &mut Recorder) -> Result<Page, Error> {
+        enter(recorder, Stage::Unwrap)?;
+        let atlas = self.lay_out(room)?;
+        self.paint(atlas, recorder)
+    }
+
+    /// The least page that there can be: every surface is one chart of one texel.
+    pub(super) fn least_page(&self, recorder: &mut Recorder) -> Result<Page, Error> {
+        enter(recorder, Stage::Unwrap)?;
+        let surfaces = self.lighting.surfaces();
+        let padding = Some(self.options.padding.unwrap_or(0));
+        let unwrapping = UnwrapOptions { padding, ..UnwrapOptions::new(Room::Texels(0.0)) };
+        let atlas = unwrap(surfaces, &whole(surfaces), &unwrapping)?;
+        self.paint(atlas, recorder)
+    }
+
+    /// What a page of this solution holds.
+    pub(super) fn options(&self) -> &BakeOptions {
+        self.options
+    }
+
+    fn paint(&self, atlas: Atlas, recorder: &mut Recorder) -> Result<Page, Error> {
+        enter(recorder, Stage::Raster)?;
+        let (lightmap, texels) = rasterize(self.lighting, &atlas);
+        Ok(Page { atlas, lightmap, texels })
+    }
+
+    /// How large the page becomes, or about how large.
+    fn room(&self) -> Room {
+        match self.options.resolution {
+            Resolution::Size(side) => Room::Square(side),
+            Resolution::TexelsPerMetre(density) => Room::Density(density),
+            Resolution::Bytes(bytes) => Room::Texels(texels_for(bytes, self.options.quantity)),
+        }
+    }
+
+    fn lay_out(&self, room: Room) -> Result<Atlas, UnwrapError> {
+        let surfaces = self.lighting.surfaces();
+        let mut unwrapping = UnwrapOptions { padding: self.options.padding, ..UnwrapOptions::new(room) };
+        let parts = match &self.survey {
+            None => whole(surfaces),
+            Some(survey) => {
+                let mut parts = survey.cut(surfaces, self.density(room));
+                let mean = normalize(surfaces, &mut parts);
+                if !matches!(room, Room::Density(_)) {
+                    unwrapping.most = Some(SPARE * mean);
+                }
+                parts
+            }
+        };
+        unwrap(surfaces, &parts, &unwrapping)
+    }
+
+    /// What deciding on density must know of the page.
+    fn density(&self, room: Room) -> DensityOptions {
+        let texels = match room {
+            Room::Square(side) => FILLED * f64::from(side).powi(2),
+            Room::Density(density) => {
+                let area: f64 = self.lighting.surfaces().iter().map(|s| s.area).sum();
+                area * density * density / COVERED
+            }
+            Room::Texels(texels) => texels,
+        };
+        let longest = match room {
+            Room::Square(side) => f64::from(side) - 1.0,
+            _ => LONGEST * texels.sqrt(),
+        };
+        let padding = self.options.padding.unwrap_or(1);
+        DensityOptions { texels, longest, padding, uniform_texel: self.texel }
     }
 }
 

@@ -3,6 +3,9 @@
 use crate::options::{BakeOptions, Direct, Resolution};
 use crate::surface::Surface;
 
+use super::budget::texels_for;
+use super::page::FILLED;
+
 /// About how many patches the scene's area is divided into; small surfaces come on top.
 const PATCHES: f64 = 500.0;
 
@@ -30,6 +33,10 @@ impl Scale {
         let texel = match options.resolution {
             Resolution::Size(side) => (area / UTILISATION).sqrt() / f64::from(side),
             Resolution::TexelsPerMetre(density) => 1.0 / density,
+            Resolution::Bytes(bytes) => {
+                let page = texels_for(bytes, options.quantity) / FILLED;
+                (area / UTILISATION / page).sqrt()
+            }
         };
         let patch_size = (area / PATCHES).sqrt();
         let threshold = options.subdivision_threshold.unwrap_or(match options.direct {
