@@ -4,13 +4,12 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::density::{DensityOptions, apportion};
 use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
-use crate::export::{Baked, encode, lightmap_bytes};
-use crate::options::{BakeOptions, DensityPolicy, Direct, Resolution};
+use crate::export::{Baked, encode};
+use crate::options::BakeOptions;
 use crate::progress::{Progress, Stage};
-use crate::raster::{Lighting, Lightmap, RasterInput, rasterize};
+use crate::raster::{Lighting, Lightmap, RasterInput};
 use crate::report::{Recorder, Report};
 use crate::retriangulate::RadiosityMesh;
 use crate::retriangulate::mesh::radiosity_mesh;
@@ -18,18 +17,16 @@ use crate::scene::{ImportOptions, Scene};
 use crate::solve::{Problem, Solution, solve};
 use crate::surface::{Geometry, Surface, build_surfaces};
 use crate::trace::Tracer;
-use crate::unwrap::{Atlas, UnwrapOptions, unwrap, whole};
+use crate::unwrap::Atlas;
+use page::{Page, PageMaker};
+use scale::Scale;
+use written::Written;
 
 mod account;
-
-/// About how many patches the scene's area is divided into; small surfaces come on top.
-const PATCHES: f64 = 500.0;
-
-/// Share of a page that charts fill, about: what a texel's size is guessed with before the charts are packed.
-const UTILISATION: f64 = 0.6;
-
-/// With direct light evaluated in texels, elements need not follow its shadows closer than this many texels.
-const TEXELS_AN_ELEMENT: f64 = 4.0;
+mod budget;
+mod page;
+mod scale;
+mod written;
 
 /// Samples keep this fraction of the scene's diagonal from outlines.
 const NUDGE: f64 = 1e-5;
@@ -142,15 +139,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         options,
     };
     let lighting = Lighting::new(&raster_input);
-    let unwrapping = UnwrapOptions { resolution: options.resolution, padding: options.padding };
-    let parts = match options.density {
-        DensityPolicy::Light => apportion(&lighting, scale.density(options)).parts,
-        DensityPolicy::Uniform => whole(&surfaces),
-    };
-    let atlas = unwrap(&surfaces, &parts, &unwrapping)?;
-
-    enter(&mut recorder, Stage::Raster)?;
-    let (lightmap, texels) = rasterize(&lighting, &atlas);
+    let Page { atlas, lightmap, texels } =
+        PageMaker::new(&lighting, options, scale.texel).page(&mut recorder)?;
 
     enter(&mut recorder, Stage::Export)?;
     let glb = encode(&Baked {
@@ -165,7 +155,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     report.elements.initial = initial;
     account::fill_report(&mut report, scene, &surfaces, &solution);
     account::fill_texels(&mut report, &atlas, texels);
-    report.lightmap.bytes = lightmap_bytes(&glb);
+    let written = Written::in_document(&glb);
+    (report.lightmap.bytes, report.lightmap.png_bytes) = (written.exr, written.png);
     recorder.finish(&mut report);
     drop(appearance);
     let Solution { facets, .. } = solution;
@@ -189,53 +180,4 @@ fn tracer(scene: &Scene) -> Tracer {
         .map(|t| scene.materials[scene.placements[t.placement as usize].material].double_sided)
         .collect();
     Tracer::new(triangles).with_double_sided(double_sided)
-}
-
-/// Lengths that follow from the scene's area and the lightmap's resolution, metres.
-struct Scale {
-    patch_size: f64,
-    threshold: f64,
-    indirect_threshold: f64,
-    texel: f64,
-    /// The page's side.
-    side: f64,
-}
-
-/// The share of a page that charts and their padding fill.
-const FILLED: f64 = 0.95;
-
-impl Scale {
-    fn density(&self, options: &BakeOptions) -> DensityOptions {
-        let side = match options.resolution {
-            Resolution::Size(side) => f64::from(side),
-            Resolution::TexelsPerMetre(density) => density * self.side,
-        };
-        DensityOptions {
-            texels: FILLED * side * side,
-            longest: side - 1.0,
-            padding: options.padding.unwrap_or(1),
-            uniform_texel: self.texel,
-        }
-    }
-
-    fn of(surfaces: &[Surface], options: &BakeOptions) -> Self {
-        let area: f64 = surfaces.iter().map(|s| s.area).sum();
-        let texel = match options.resolution {
-            Resolution::Size(side) => (area / UTILISATION).sqrt() / f64::from(side),
-            Resolution::TexelsPerMetre(density) => 1.0 / density,
-        };
-        let patch_size = (area / PATCHES).sqrt();
-        let threshold = options.subdivision_threshold.unwrap_or(match options.direct {
-            Direct::Mesh => texel,
-            Direct::Texel => TEXELS_AN_ELEMENT * texel,
-        });
-        let indirect_threshold = options.subdivision_threshold.unwrap_or(texel);
-        Self {
-            patch_size: patch_size.max(threshold),
-            threshold,
-            indirect_threshold,
-            texel,
-            side: (area / UTILISATION).sqrt(),
-        }
-    }
 }

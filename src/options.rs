@@ -68,6 +68,9 @@ pub enum Resolution {
     Size(u32),
     /// Texels per metre of surface, above 0; the page's side follows.
     TexelsPerMetre(f64),
+    /// As much as fits into this many bytes, `[1, 2³²)`: all lightmaps together as they are written, the EXR
+    /// and the PNG. Never a byte more; density, and the page's shape and size follow.
+    Bytes(u64),
 }
 
 impl Default for Resolution {
@@ -212,6 +215,10 @@ impl BakeOptions {
             }
             Resolution::TexelsPerMetre(t) => {
                 check(t.is_finite() && t > 0.0, "texels-per-metre", t, "a number above 0")?;
+            }
+            Resolution::Bytes(b) => {
+                let range = "at least 1 byte and less than 4 GiB, as a glTF's buffer is";
+                check((1..1 << 32).contains(&b), "budget", b as f64, range)?;
             }
         }
         check(self.threads <= 1024, "threads", self.threads as f64, "at most 1024 (0 takes one per core)")?;

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use cobake::geom::{Frame, polygon};
-use cobake::options::Resolution;
 use cobake::raster::{SitePosition, TexelSite, sites};
 use cobake::surface::{Region, Surface};
-use cobake::unwrap::{Atlas, UnwrapError, UnwrapOptions, whole};
+use cobake::unwrap::{Atlas, Room, UnwrapError, UnwrapOptions, whole};
 use glam::{DVec2, DVec3};
 
 /// Texel coordinates are sums of few f64 of at most 2^14.
@@ -102,7 +101,7 @@ fn unwrap(surfaces: &[Surface], options: &UnwrapOptions) -> Result<Atlas, Unwrap
 }
 
 fn at_size(side: u32) -> UnwrapOptions {
-    UnwrapOptions { resolution: Resolution::Size(side), padding: None }
+    UnwrapOptions::new(Room::Square(side))
 }
 
 fn all_open(_: usize, _: usize) -> bool {
@@ -176,7 +175,8 @@ fn charts_keep_apart_on_a_page_of_given_size() {
     for (seed, side) in [(1, 64), (2, 128), (3, 200), (4, 256)] {
         let surfaces = furniture(48, seed);
         let atlas = unwrap(&surfaces, &at_size(side)).unwrap();
-        assert_eq!((atlas.width, atlas.height, atlas.padding), (side, side, 1));
+        assert_eq!(atlas.padding, 1);
+        assert!(atlas.width.min(atlas.height) > side * 7 / 8 && atlas.width.max(atlas.height) <= side);
         assert_sound(&surfaces, &atlas);
     }
 }
@@ -185,12 +185,47 @@ fn charts_keep_apart_on_a_page_of_given_size() {
 fn charts_keep_apart_at_a_given_density() {
     let surfaces = furniture(40, 5);
     for (texels_per_metre, padding) in [(1e-9, 2), (8.0, 0), (20.0, 3)] {
-        let resolution = Resolution::TexelsPerMetre(texels_per_metre);
-        let atlas = unwrap(&surfaces, &UnwrapOptions { resolution, padding: Some(padding) }).unwrap();
-        assert_eq!((atlas.width % 4, atlas.width), (0, atlas.height));
+        let options =
+            UnwrapOptions { padding: Some(padding), ..UnwrapOptions::new(Room::Density(texels_per_metre)) };
+        let atlas = unwrap(&surfaces, &options).unwrap();
+        assert_eq!((atlas.width % 4, atlas.height % 4), (0, 0));
         assert_eq!((atlas.texels_per_metre, atlas.padding), (texels_per_metre, padding));
         assert_sound(&surfaces, &atlas);
     }
+}
+
+/// A page that the charts do not need is not written: what no chart reaches is cut off.
+#[test]
+fn pages_are_cropped_to_their_charts() {
+    // Four squares of at most 10 texels in a page of 256.
+    let few: Vec<_> = (0..4).map(|_| rectangle(1.0, 1.0)).collect();
+    let atlas = unwrap(&few, &UnwrapOptions { most: Some(10.0), ..at_size(256) }).unwrap();
+    assert_sound(&few, &atlas);
+    assert_eq!((atlas.texels_per_metre, atlas.width, atlas.height), (10.0, 24, 24));
+    // One of 3 : 1 fills a page's width and not its height.
+    let wide = [rectangle(3.0, 1.0)];
+    let atlas = unwrap(&wide, &at_size(256)).unwrap();
+    assert_sound(&wide, &atlas);
+    let (long, short) = (atlas.width.max(atlas.height), atlas.width.min(atlas.height));
+    assert_eq!((long, short), (256, 88), "85 and one texels, in fours");
+}
+
+/// Where only the density is given the page takes any shape, and hardly more texels than the charts with padding.
+#[test]
+fn the_least_page_is_small() {
+    let mut r = Random(9);
+    let surfaces: Vec<_> = (0..200).map(|_| rectangle(r.between(0.1, 2.0), r.between(0.1, 1.0))).collect();
+    for texels in [3_000.0, 30_000.0, 300_000.0] {
+        let atlas = unwrap(&surfaces, &UnwrapOptions::new(Room::Texels(texels))).unwrap();
+        assert_sound(&surfaces, &atlas);
+        assert_eq!((atlas.width % 4, atlas.height % 4), (0, 0));
+        let page = f64::from(atlas.width) * f64::from(atlas.height);
+        assert!(page < 1.08 * texels && page > 0.8 * texels, "{page} for {texels}");
+    }
+    // Fewer texels than one a chart there cannot be.
+    let atlas = unwrap(&surfaces, &UnwrapOptions::new(Room::Texels(1.0))).unwrap();
+    assert!(atlas.width * atlas.height <= 80 * 80, "200 charts of 4 × 4 with their padding");
+    assert_sound(&surfaces, &atlas);
 }
 
 /// Rectangles fill a page well: what a rectangle packer is for.
@@ -270,9 +305,8 @@ fn buried_regions_give_way_to_open_ones() {
     let halves = [strip(0.0), strip(2.0)].map(|q| region(vec![[q[0], q[1], q[2]], [q[0], q[2], q[3]]], q));
     let ring = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)].map(DVec2::from).to_vec();
     let floor = surface(ring, halves.to_vec());
-    let resolution = Resolution::TexelsPerMetre(10.25);
     let floors = [floor];
-    let atlas = unwrap(&floors, &UnwrapOptions { resolution, padding: None }).unwrap();
+    let atlas = unwrap(&floors, &UnwrapOptions::new(Room::Density(10.25))).unwrap();
     let chart = &atlas.charts[0];
     let mut counts = [0; 3];
     for site in sites(&floors, &atlas, &|_, region| region == 0) {
@@ -293,12 +327,12 @@ fn buried_regions_give_way_to_open_ones() {
 #[test]
 fn what_does_not_fit_is_refused() {
     let many: Vec<_> = (0..300).map(|_| rectangle(1.0, 1.0)).collect();
-    let padded = UnwrapOptions { resolution: Resolution::Size(32), padding: Some(1) };
+    let padded = UnwrapOptions { padding: Some(1), ..at_size(32) };
     assert_eq!(
         unwrap(&many, &padded).err(),
         Some(UnwrapError::TooSmall { charts: 300, padding: 1, side: 32 })
     );
-    let huge = UnwrapOptions { resolution: Resolution::TexelsPerMetre(1e5), padding: None };
+    let huge = UnwrapOptions::new(Room::Density(1e5));
     assert!(matches!(unwrap(&many, &huge), Err(UnwrapError::TooLarge { charts: 300, .. })));
 }
 
@@ -314,7 +348,8 @@ fn crowded_charts_do_without_padding() {
 #[test]
 fn degenerate_input_gets_a_chart() {
     let none = unwrap(&[], &at_size(64)).unwrap();
-    assert_eq!((none.width, none.charts.len(), sites(&[], &none, &all_open).len()), (64, 0, 0));
+    assert_eq!((none.width, none.height, none.charts.len()), (4, 4, 0));
+    assert!(sites(&[], &none, &all_open).is_empty());
     let mut odd = vec![rectangle(1e-12, 1e-12), rectangle(1.0, 1.0), rectangle(1e7, 1e-3)];
     odd.push(surface(Vec::new(), Vec::new()));
     odd.push(star(&[(0.0, 0.0), (f64::NAN, 0.0), (1.0, f64::INFINITY)], 0));

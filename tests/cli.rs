@@ -14,6 +14,7 @@ const SMALL: [&str; 2] = ["--size", "32"];
 /// Everything that `cobake bake` can be told.
 const OPTIONS: [&str; 23] = [
     "--output",
+    "--budget",
     "--size",
     "--texels-per-metre",
     "--threads",

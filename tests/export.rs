@@ -6,10 +6,14 @@
     reason = "a test may fail; clippy sees tests but not what they call"
 )]
 
+#[path = "export/cuts.rs"]
+mod cuts;
 #[path = "export/files.rs"]
 mod files;
 #[path = "export/fixture.rs"]
 mod fixture;
+#[path = "export/pieces.rs"]
+mod pieces;
 
 use cobake::export::{decode_exr, encode, encode_png, verify};
 use cobake::options::{Quantity, Topology};

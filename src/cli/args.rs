@@ -7,6 +7,7 @@ use cobake::options::{
     BakeOptions, CobHeight, DensityPolicy, Direct, Quantity, Refine, Resolution, Toggle, Topology,
 };
 
+use super::bytes;
 use super::compare_args::CompareArgs;
 
 /// Bakes lightmaps into glTF scenes: radiosity on a mesh that refines itself near close occluders.
@@ -69,6 +70,11 @@ pub(crate) struct BakeArgs {
     /// Texels per metre of surface, above 0; the lightmap's side follows
     #[arg(long, value_name = "DENSITY", conflicts_with = "size", allow_negative_numbers = true, help_heading = LIGHTMAP)]
     texels_per_metre: Option<f64>,
+
+    /// The most that the lightmaps may take in the output, EXR and PNG together, such as 4MiB, 500KB or a number
+    /// of bytes; density and the page's shape follow
+    #[arg(long, value_name = "BYTES", value_parser = bytes::parse, conflicts_with_all = ["size", "texels_per_metre"], help_heading = LIGHTMAP)]
+    budget: Option<u64>,
 
     /// Where texels are dense
     #[arg(long, value_enum, default_value_t = DensityWord::Light, help_heading = LIGHTMAP)]
@@ -240,8 +246,11 @@ impl From<&BakeArgs> for BakeOptions {
     fn from(args: &BakeArgs) -> Self {
         let on_unless = |switched_off| if switched_off { Toggle::Off } else { Toggle::On };
         let mut options = Self::default();
-        options.resolution =
-            args.texels_per_metre.map_or(Resolution::Size(args.size), Resolution::TexelsPerMetre);
+        options.resolution = match (args.texels_per_metre, args.budget) {
+            (Some(density), _) => Resolution::TexelsPerMetre(density),
+            (None, Some(bytes)) => Resolution::Bytes(bytes),
+            (None, None) => Resolution::Size(args.size),
+        };
         options.density = args.density.into();
         options.threads = args.threads;
         options.refine = args.refine.into();
@@ -317,6 +326,7 @@ mod tests {
     #[test]
     fn the_second_way_of_saying_size_and_height_wins_over_the_default() {
         assert_eq!(options("--texels-per-metre 40").resolution, Resolution::TexelsPerMetre(40.0));
+        assert_eq!(options("--budget 4MiB").resolution, Resolution::Bytes(4 << 20));
         assert_eq!(options("--cob-height-fixed 0.03").cob_height, CobHeight::Metres(0.03));
     }
 

@@ -5,6 +5,7 @@
 
 mod args;
 mod bake;
+mod bytes;
 mod compare;
 mod compare_args;
 mod failure;

@@ -20,10 +20,13 @@ const CUTS: usize = 24;
 const DEEPEST: u32 = 24;
 
 /// What a chart costs beside its texels, in texels: the vertices that cutting adds.
-const CHART: f64 = 40.0;
+const CHART: f64 = 12.0;
 
 /// Spacings that are tried within a halving.
 const STEPS: usize = 2;
+
+/// Trees are cut as would pay at this fraction of the expected price.
+const SPARE: f64 = 0.2;
 
 /// Searches for the price that fills the page.
 const TRIES: u32 = 16;
@@ -31,46 +34,65 @@ const TRIES: u32 = 16;
 /// All surfaces' parts, together of as many texels as the options allow.
 pub(super) fn cut(surfaces: &[Surface], surveys: &Surveys, options: DensityOptions) -> Vec<Part> {
     let most = surveys.surfaces.iter().map(total_error).sum::<f64>().max(f64::MIN_POSITIVE);
-    // At a price below the one that will be paid there are more cuts than needed.
-    let finest = 0.004 * surveys.price;
-    let trees: Vec<Tree> =
-        surveys.surfaces.par_iter().map(|survey| Cutter::new(survey, finest, options).tree()).collect();
-    let at_price = |price: f64| -> Vec<Vec<Leaf>> {
-        let of = |(tree, survey): (&Tree, &SurfaceSurvey)| tree.pruned(&Cutter::new(survey, price, options));
-        trees.par_iter().zip(&surveys.surfaces).map(of).collect()
-    };
-    let texels = |leaves: &[Vec<Leaf>]| leaves.iter().flatten().map(|l| l.texels).sum::<f64>();
-    let (mut low, mut high) = ((1e-16 * most).ln(), most.ln());
-    let mut best = None;
-    let mut middle = (0.02 * surveys.price).clamp(1e-16 * most, most).ln();
-    for _ in 0..TRIES {
-        let leaves = at_price(middle.exp());
-        let taken = texels(&leaves);
-        tracing::debug!(price = middle.exp(), taken, "try");
-        // Texels go with about the -0.6th power of the price; a little more is aimed at than is wanted.
-        let towards = middle + 1.7 * (taken / (0.992 * options.texels)).ln();
-        if taken <= options.texels {
-            high = middle;
-            best = Some(leaves);
-            if taken > 0.985 * options.texels {
-                break;
-            }
-        } else {
-            low = middle;
+    let mut price = surveys.price.clamp(1e-16 * most, most);
+    let mut leaves;
+    loop {
+        // At a lower price than will be paid there are more cuts than needed.
+        let forest = Forest::new(surveys, options, SPARE * price);
+        (price, leaves) = forest.within(options.texels, (1e-16 * most, most));
+        if price >= forest.price || price <= 1e-15 * most {
+            break;
         }
-        middle = if towards > low && towards < high { towards } else { 0.5 * (low + high) };
     }
-    let leaves = best.unwrap_or_else(|| at_price(most));
-    tracing::debug!(
-        guess = surveys.price,
-        price = high.exp(),
-        texels = texels(&leaves),
-        nodes = trees.iter().map(Tree::nodes).sum::<usize>(),
-        parts = leaves.iter().map(Vec::len).sum::<usize>(),
-        "cut"
-    );
     let parts = leaves.into_iter().zip(surfaces).enumerate();
     parts.flat_map(|(index, (leaves, surface))| parts_of(index, surface, &leaves)).collect()
+}
+
+/// The trees of all surfaces.
+struct Forest<'a> {
+    surveys: &'a Surveys,
+    options: DensityOptions,
+    /// Cuts were made that pay at this price.
+    price: f64,
+    trees: Vec<Tree>,
+}
+
+impl<'a> Forest<'a> {
+    fn new(surveys: &'a Surveys, options: DensityOptions, price: f64) -> Self {
+        let tree = |survey| Cutter::new(survey, price, options).tree();
+        Self { surveys, options, price, trees: surveys.surfaces.par_iter().map(tree).collect() }
+    }
+
+    /// The cheapest leaves at a price.
+    fn pruned(&self, price: f64) -> Vec<Vec<Leaf>> {
+        let of = |(tree, survey): (&Tree, _)| tree.pruned(&Cutter::new(survey, price, self.options));
+        self.trees.par_iter().zip(&self.surveys.surfaces).map(of).collect()
+    }
+
+    /// The leaves that take at most so many texels, and nearly as many, and their price.
+    fn within(&self, texels: f64, (least, most): (f64, f64)) -> (f64, Vec<Vec<Leaf>>) {
+        let (mut low, mut high) = (least.ln(), most.ln());
+        let mut best = None;
+        let mut middle = (self.price / SPARE).ln().clamp(low, high);
+        for _ in 0..TRIES {
+            let leaves = self.pruned(middle.exp());
+            let taken = leaves.iter().flatten().map(|l| l.texels).sum::<f64>();
+            tracing::debug!(price = middle.exp(), taken, "cut");
+            if taken <= texels {
+                high = middle;
+                best = Some(leaves);
+                if taken > 0.985 * texels {
+                    break;
+                }
+            } else {
+                low = middle;
+            }
+            // Texels go with about the -0.6th power of the price.
+            let towards = middle + 1.7 * (taken / (0.992 * texels)).ln();
+            middle = if towards > low && towards < high { towards } else { 0.5 * (low + high) };
+        }
+        (high.exp(), best.unwrap_or_else(|| self.pruned(most)))
+    }
 }
 
 fn total_error(survey: &SurfaceSurvey) -> f64 {
@@ -123,10 +145,6 @@ struct Tree {
 }
 
 impl Tree {
-    fn nodes(&self) -> usize {
-        1 + self.cut.iter().flat_map(|sides| sides.iter()).map(Self::nodes).sum::<usize>()
-    }
-
     /// The cheapest leaves that the cuts allow.
     fn pruned(&self, cutter: &Cutter) -> Vec<Leaf> {
         let mut leaves = Vec::new();

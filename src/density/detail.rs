@@ -40,17 +40,12 @@ impl Grid<'_> {
         if count == 0 { 0.0 } else { HAT * sum / f64::from(count) }
     }
 
-    /// Whether the surface is seen anywhere in the cells, and whether a shadow may cross them.
-    pub(super) fn holds(&self, low: [usize; 2], high: [usize; 2]) -> (bool, bool) {
-        let mut holds = (false, false);
-        for y in low[1]..=high[1] {
-            for x in low[0]..=high[0] {
-                if let Some(light) = self.light[y * (self.cells[0] + 1) + x] {
-                    holds = (true, holds.1 || light.is_crossed);
-                }
-            }
-        }
-        holds
+    /// The most light that may be hidden or let through in the cells unseen; `None` where they hold nothing of the
+    /// surface.
+    pub(super) fn doubtful(&self, low: [usize; 2], high: [usize; 2]) -> Option<f64> {
+        let rows = (low[1]..=high[1]).map(|y| y * (self.cells[0] + 1));
+        let nodes = rows.flat_map(|row| &self.light[row + low[0]..=row + high[0]]).flatten();
+        nodes.map(|light| light.doubtful).reduce(f64::max)
     }
 
     fn node(&self, [x, y]: [usize; 2]) -> Option<DVec3> {
@@ -64,7 +59,7 @@ mod tests {
 
     fn grid(light: impl Fn(f64, f64) -> f64) -> Vec<Option<PointLight>> {
         let at = |k: usize| light((k % 9) as f64 / 8.0, (k / 9) as f64 / 8.0);
-        (0..81).map(|k| Some(PointLight { irradiance: DVec3::splat(at(k)), is_crossed: false })).collect()
+        (0..81).map(|k| Some(PointLight { irradiance: DVec3::splat(at(k)), doubtful: 0.0 })).collect()
     }
 
     /// Linear interpolation of x² at spacing h misses h²/4 in the middle: a surplus that falls fourfold a halving.

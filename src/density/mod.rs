@@ -15,9 +15,10 @@ mod survey;
 use glam::DVec2;
 
 use crate::raster::Lighting;
+use crate::surface::Surface;
 use crate::unwrap::Part;
 
-/// What is known before the survey.
+/// What is known before the light is looked at, or before surfaces are cut.
 #[derive(Clone, Copy, Debug)]
 pub struct DensityOptions {
     /// How many texels all charts may take together with their padding.
@@ -30,21 +31,29 @@ pub struct DensityOptions {
     pub uniform_texel: f64,
 }
 
-/// How the surfaces are cut, and what it was told from.
-#[derive(Clone, Debug)]
-pub struct Density {
-    /// Ordered by surface; weights are texels a metre.
-    pub parts: Vec<Part>,
-    /// Points at which light was evaluated.
-    pub samples: u64,
-}
+/// What the light is like on all surfaces. Asking the light is what costs; cutting for another number of
+/// texels asks nothing anew.
+pub struct LightSurvey(survey::Surveys);
 
-/// Cuts the surfaces into parts whose texels are as fine as the light needs.
-#[must_use]
-pub fn apportion(lighting: &Lighting, options: DensityOptions) -> Density {
-    let surveys = survey::survey(lighting, options);
-    let parts = cut::cut(lighting.surfaces(), &surveys, options);
-    Density { parts, samples: surveys.samples }
+impl LightSurvey {
+    /// Looks at the light, about as closely as that many texels will show it.
+    #[must_use]
+    pub fn of(lighting: &Lighting, options: DensityOptions) -> Self {
+        Self(survey::survey(lighting, options))
+    }
+
+    /// Cuts the surfaces that were looked at into parts whose texels are as fine as the light needs:
+    /// ordered by surface, weights are texels a metre.
+    #[must_use]
+    pub fn cut(&self, surfaces: &[Surface], options: DensityOptions) -> Vec<Part> {
+        cut::cut(surfaces, &self.0, options)
+    }
+
+    /// Points at which light was evaluated.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.0.samples
+    }
 }
 
 /// How much error there is at each spacing: levels count halvings of a surface's first spacing.

@@ -1,9 +1,9 @@
 //! Sampling the light, finer where it needs it.
 //!
 //! Every surface begins with a grid of tiles. A tile's four quarters are each a candidate for a tile of
-//! half the spacing; those go first whose finest samples change most for a sample more. A quarter across
-//! which a shadow may fall unseen between the samples is looked into until these are as close as texels
-//! of one density would be.
+//! half the spacing; those go first whose finest samples change most for a sample more. Light that
+//! something between an emitter and a quarter may hide or let through unseen between the samples counts
+//! as such a change, until these are as close as texels of one density would be.
 
 use glam::{DAffine2, DMat2, DVec2};
 use rayon::prelude::*;
@@ -24,11 +24,15 @@ const FIRST_SPACING: f64 = 4.0;
 /// Shadows that fall between samples are looked for until these are this many uniform texels apart.
 const BLIND_SPACING: f64 = 1.0;
 
-/// Samples for each texel, at most.
-const SAMPLES_A_TEXEL: f64 = 2.5;
+/// The mean squared error that light in doubt is taken to hide, as a fraction of its square.
+const DOUBT: f64 = 0.02;
 
-/// The share of them that looking for shadows may take.
-const BLIND_SHARE: f64 = 0.5;
+/// Samples for each texel, at most: the cheaper they are the more,
+const MOST_SAMPLES: f64 = 2.5;
+/// and never fewer;
+const LEAST_SAMPLES: f64 = 1.2;
+/// between these so many for each emitter that they have to ask.
+const SAMPLES_BY_EMITTERS: f64 = 10.0;
 
 /// How often it is decided anew where to look closer.
 const ROUNDS: u32 = 10;
@@ -60,44 +64,26 @@ struct Quarter {
     /// Halvings so far, for either axis.
     levels: [usize; 2],
     energy: Energy,
-    is_crossed: bool,
+    /// Mean squared error that shadows between the samples may hide.
+    doubt: f64,
 }
 
 /// Looks at the light on all surfaces.
 pub(super) fn survey(lighting: &Lighting, options: DensityOptions) -> Surveys {
     let surfaces = lighting.surfaces();
     let roots: Vec<Root> = surfaces.iter().map(|s| Root::of(s, options.uniform_texel)).collect();
-    let tiles: Vec<Tile> = roots.iter().enumerate().flat_map(|(index, root)| root.tiles(index)).collect();
+    let blind_spacing = BLIND_SPACING * options.uniform_texel;
+    let tiles: Vec<Tile> =
+        roots.iter().enumerate().flat_map(|(index, root)| root.tiles(index, blind_spacing)).collect();
     let mut samples = 0;
     let mut look = |tiles: &[Tile]| -> Vec<Quarter> {
         samples += tiles.iter().map(Tile::samples).sum::<u64>();
         tiles.par_iter().map(|tile| tile.look(lighting)).collect::<Vec<_>>().into_iter().flatten().collect()
     };
     let mut quarters = look(&tiles);
-    let budget = (SAMPLES_A_TEXEL * options.texels) as u64;
+    let by_cost = SAMPLES_BY_EMITTERS / (1 + lighting.emitters()) as f64;
+    let budget = (by_cost.clamp(LEAST_SAMPLES, MOST_SAMPLES) * options.texels) as u64;
     let mut left = budget;
-
-    // Shadows between the samples.
-    let is_blind =
-        |q: &Quarter| q.is_crossed && q.spacing().max_element() > BLIND_SPACING * options.uniform_texel;
-    let mut blind = (BLIND_SHARE * budget as f64) as u64;
-    loop {
-        let (mut closer, rest): (Vec<_>, Vec<_>) = quarters.into_iter().partition(is_blind);
-        quarters = rest;
-        let affordable = affordable(&closer, blind);
-        let over = closer.split_off(affordable);
-        quarters.extend(over.iter().copied());
-        if closer.is_empty() {
-            break;
-        }
-        let tiles: Vec<Tile> = closer.iter().map(Quarter::tile).collect();
-        let spent: u64 = tiles.iter().map(Tile::samples).sum();
-        (left, blind) = (left.saturating_sub(spent), blind - spent);
-        quarters.extend(look(&tiles));
-        if !over.is_empty() {
-            break;
-        }
-    }
 
     let mut price = 0.0;
     for round in 0..ROUNDS {
@@ -113,7 +99,7 @@ pub(super) fn survey(lighting: &Lighting, options: DensityOptions) -> Surveys {
         let affordable = affordable(&candidates, share);
         quarters.extend(candidates.split_off(affordable));
         price = candidates.last().map_or(price, Quarter::worth);
-        let tiles: Vec<Tile> = candidates.iter().map(Quarter::tile).collect();
+        let tiles: Vec<Tile> = candidates.iter().map(|q| q.tile(blind_spacing)).collect();
         left = left.saturating_sub(tiles.iter().map(Tile::samples).sum());
         quarters.extend(look(&tiles));
     }
@@ -135,7 +121,7 @@ fn affordable(quarters: &[Quarter], samples: u64) -> usize {
     quarters
         .iter()
         .take_while(|q| {
-            sum += q.tile().samples();
+            sum += self::samples(q.cells);
             sum <= samples
         })
         .count()
@@ -166,7 +152,7 @@ impl Root {
         (self.max - self.min) / DVec2::new(self.tiles[0] as f64, self.tiles[1] as f64)
     }
 
-    fn tiles(&self, surface: usize) -> Vec<Tile> {
+    fn tiles(&self, surface: usize, blind_spacing: f64) -> Vec<Tile> {
         let size = self.tile_size();
         if !size.is_finite() || size.min_element() <= 0.0 {
             return Vec::new();
@@ -175,7 +161,7 @@ impl Root {
             let at = DVec2::new((k % self.tiles[0]) as f64, (k / self.tiles[0]) as f64);
             let min = self.min + at * size;
             let levels = self.cells.map(|c| c.ilog2() as usize);
-            Tile { surface, min, max: min + size, cells: self.cells, levels, known: None }
+            Tile { surface, min, max: min + size, cells: self.cells, levels, blind_spacing, known: None }
         };
         (0..self.tiles[0] * self.tiles[1]).map(tile).collect()
     }
@@ -185,6 +171,11 @@ impl Root {
     }
 }
 
+/// Samples that a tile of so many cells takes.
+fn samples(cells: [usize; 2]) -> u64 {
+    ((cells[0] + 1) * (cells[1] + 1)) as u64
+}
+
 /// A grid of samples to be taken.
 struct Tile {
     surface: usize,
@@ -192,13 +183,15 @@ struct Tile {
     max: DVec2,
     cells: [usize; 2],
     levels: [usize; 2],
+    /// Shadows may hide between samples farther apart than this, metres.
+    blind_spacing: f64,
     /// What coarser samples told, if there were any.
     known: Option<Energy>,
 }
 
 impl Tile {
     fn samples(&self) -> u64 {
-        ((self.cells[0] + 1) * (self.cells[1] + 1)) as u64
+        samples(self.cells)
     }
 
     /// Takes the samples.
@@ -223,10 +216,7 @@ impl Tile {
         let half = self.cells.map(|c| c / 2);
         let low = [at[0] * half[0], at[1] * half[1]];
         let high = [low[0] + half[0], low[1] + half[1]];
-        let (is_seen, is_crossed) = grid.holds(low, high);
-        if !is_seen {
-            return None;
-        }
+        let doubtful = grid.doubtful(low, high)?;
         let mut energy = self.known.unwrap_or_default();
         for axis in 0..2 {
             // Coarser halvings are known from the tile that this one is a quarter of.
@@ -242,7 +232,11 @@ impl Tile {
         };
         let (min, max) = (pick(self.min, middle), pick(middle, self.max));
         let (surface, cells, levels) = (self.surface, self.cells, self.levels);
-        Some(Quarter { surface, min, max, cells, levels, energy, is_crossed })
+        let mut quarter = Quarter { surface, min, max, cells, levels, energy, doubt: 0.0 };
+        if quarter.spacing().max_element() > self.blind_spacing {
+            quarter.doubt = DOUBT * doubtful * doubtful;
+        }
+        Some(quarter)
     }
 }
 
@@ -257,15 +251,15 @@ impl Quarter {
     }
 
     /// The tile that looks closer.
-    fn tile(&self) -> Tile {
+    fn tile(&self, blind_spacing: f64) -> Tile {
         let Self { surface, min, max, cells, levels, energy, .. } = *self;
-        Tile { surface, min, max, cells, levels: levels.map(|l| l + 1), known: Some(energy) }
+        Tile { surface, min, max, cells, levels: levels.map(|l| l + 1), blind_spacing, known: Some(energy) }
     }
 
-    /// What the last halving changed, for each sample that another one takes.
+    /// What the last halving changed, and what may be hidden, for each sample that another one takes.
     fn worth(&self) -> f64 {
         let last = |axis: usize| f64::from(self.energy[axis][self.levels[axis] - 1]);
-        self.size().element_product() * (last(0) + last(1)) / self.tile().samples() as f64
+        self.size().element_product() * (last(0) + last(1) + self.doubt) / samples(self.cells) as f64
     }
 
     /// What was found, and what follows from it about finer halvings.

@@ -261,6 +261,8 @@ impl Facet {
             cob: Cob::UNINITIALIZED,
             direct: Shading::default(),
             indirect: Shading::default(),
+            is_uneven: false,
+            is_enclosed: false,
         });
         Some((self.elements.len() - 1) as u32)
     }

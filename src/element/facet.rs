@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::{Element, NONE};
+use super::{Element, NONE, Shading};
 use crate::cob::CobLists;
 use crate::geom::{Frame, Ring};
 use crate::solve::form_factor::SurfacePoint;
@@ -143,6 +143,33 @@ impl Facet {
         (direct.max(DVec3::ZERO), indirect.max(DVec3::ZERO))
     }
 
+    /// The reflected light that `element` and its ancestors had at `p` when their shadings were these, by element;
+    /// those that there were not yet had none.
+    #[must_use]
+    pub fn indirect_before(&self, before: &[Shading], element: u32, p: DVec2) -> DVec3 {
+        let (mut indirect, mut at) = (DVec3::ZERO, element);
+        while at != NONE {
+            let e = &self.elements[at as usize];
+            indirect += before.get(at as usize).map_or(DVec3::ZERO, |s| s.at(e.place(p)));
+            at = e.parent;
+        }
+        indirect.max(DVec3::ZERO)
+    }
+
+    /// Whether `element` or an ancestor lies in a narrow gap.
+    #[must_use]
+    pub fn is_enclosed(&self, element: u32) -> bool {
+        let mut at = element;
+        while at != NONE {
+            let e = &self.elements[at as usize];
+            if e.is_enclosed {
+                return true;
+            }
+            at = e.parent;
+        }
+        false
+    }
+
     /// Mean direct and indirect irradiance over `element`, its parts and its ancestors included.
     #[must_use]
     pub fn mean(&self, element: u32) -> (DVec3, DVec3) {
@@ -159,6 +186,20 @@ impl Facet {
                 (direct + a * d, indirect + a * i, area + a)
             });
         (direct / area, indirect / area)
+    }
+
+    /// Multiplies what `element` and its parts received by reflection, but not in narrow gaps.
+    pub fn scale_open_indirect(&mut self, element: u32, scale: DVec3) {
+        let mut stack = vec![element];
+        while let Some(at) = stack.pop() {
+            let e = &mut self.elements[at as usize];
+            if e.is_enclosed {
+                continue;
+            }
+            e.indirect.corners.iter_mut().for_each(|c| *c *= scale);
+            e.indirect.bulge *= scale;
+            stack.extend(e.children());
+        }
     }
 
     /// The leaves that `element` is split into, or itself.

@@ -57,6 +57,11 @@ pub struct Element {
     pub direct: Shading,
     /// Indirect irradiance that it received itself.
     pub indirect: Shading,
+    /// Whether reflected light was found to be uneven over it, so that its parts gather in its place. What one round
+    /// found holds in the next ones: a middle that is right by chance must not undo it.
+    pub is_uneven: bool,
+    /// Whether it lies in a narrow gap, as reflected light was gathered last.
+    pub is_enclosed: bool,
 }
 
 /// Light over an element's rectangle.

@@ -3,17 +3,19 @@
 //! Every lit primitive becomes the triangles of its surfaces, in its node's space, so that nodes and
 //! their animations stay as they are. The attributes are `POSITION`, `NORMAL` (flat), `TEXCOORD_1`,
 //! `_IRRADIANCE` (direct and indirect irradiance of the vertex, linear RGB, in the scene's units),
-//! and the source's texture coordinates, colours and tangents, interpolated.
+//! and the source's texture coordinates, colours and tangents, interpolated. Triangles that lie in several
+//! charts are cut along the charts' borders.
 //!
 //! A node keeps its own triangles where its shape is not its triangles' alone: skins and morph
 //! targets; and where its transform cannot be undone (a scale of 0).
 
 use std::collections::BTreeMap;
 
-use glam::{DMat4, DVec2, DVec3, Vec3};
+use glam::{DMat4, DVec2, DVec3};
 use serde_json::{Value, json};
 
 use super::ExportError;
+use super::cut::ChartedMesh;
 use super::document::Object;
 use super::interpolation::{Locator, PlaneTriangle, Rows};
 use super::pool::chart_coordinates;
@@ -111,12 +113,14 @@ impl Builder {
         let normal = self.node_from_world.inverse().transpose().transform_vector3(part.surface.frame.normal);
         let normal = normal.normalize_or(DVec3::Z).as_vec3();
         let locator = (self.rows.width > 0).then(|| locator(writer, part.surface));
-        let mut copies: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for &triangle in &part.mesh.triangles {
+        let charted = ChartedMesh::of(writer.baked, part.index, part.mesh)?;
+        let mut copies: BTreeMap<(u32, usize), Vec<u32>> = BTreeMap::new();
+        for (index, &triangle) in charted.mesh.triangles.iter().enumerate() {
+            let chart = charted.chart(index);
             let mut vertices =
                 [MeshVertex { position: DVec2::ZERO, direct: DVec3::ZERO, indirect: DVec3::ZERO }; 3];
             for (slot, corner) in vertices.iter_mut().zip(triangle) {
-                *slot = *part.mesh.vertices.get(corner as usize).ok_or_else(mismatch)?;
+                *slot = *charted.mesh.vertices.get(corner as usize).ok_or_else(mismatch)?;
             }
             let centre = vertices.iter().map(|v| v.position).sum::<DVec2>() / 3.0;
             let mut out = [0; 3];
@@ -124,11 +128,12 @@ impl Builder {
                 let row = locator.as_ref().map(|l| l.interpolate(&self.rows, vertex.position, centre));
                 let mut row = row.unwrap_or_default();
                 self.rows.settle_tangent(&mut row, normal);
-                let known = copies.entry(corner).or_default();
+                let known = copies.entry((corner, chart)).or_default();
                 *slot = match known.iter().find(|&&copy| self.has_row(copy, &row)) {
                     Some(&copy) => copy,
                     None => {
-                        let copy = self.push(writer, part, vertex, normal).ok_or_else(mismatch)?;
+                        let copy = self.push(writer, part, chart, vertex).ok_or_else(mismatch)?;
+                        self.normals.extend(normal.to_array());
                         self.values.extend(row);
                         known.push(copy);
                         copy
@@ -141,14 +146,13 @@ impl Builder {
         Ok(())
     }
 
-    /// Adds a vertex but for its row and returns its index.
-    fn push(&mut self, writer: &Writer, part: &Part, vertex: &MeshVertex, normal: Vec3) -> Option<u32> {
+    /// Adds a vertex but for its normal and row and returns its index.
+    fn push(&mut self, writer: &Writer, part: &Part, chart: usize, vertex: &MeshVertex) -> Option<u32> {
         let index = u32::try_from(self.positions.len() / 3).ok()?;
         let world = part.surface.frame.lift(vertex.position);
         let local = self.node_from_world.transform_point3(world).as_vec3();
         self.positions.extend(local.to_array());
-        self.normals.extend(normal.to_array());
-        self.coordinates.extend(chart_coordinates(writer.baked, (part.index, 0), world));
+        self.coordinates.extend(chart_coordinates(writer.baked, (part.index, chart), world));
         self.irradiance.extend((vertex.direct + vertex.indirect).as_vec3().to_array());
         Some(index)
     }

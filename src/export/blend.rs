@@ -7,6 +7,9 @@
 
 use super::accessor::{Component, Elements};
 
+/// A blend as something to compare and sort by.
+pub(super) type BlendKey = ([u32; 3], [u64; 3]);
+
 /// A vertex made of up to three vertices of the source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Blend {
@@ -47,11 +50,12 @@ impl Blend {
     }
 
     /// Something to compare and sort by.
-    pub(super) fn key(&self) -> ([u32; 3], [u64; 3]) {
+    pub(super) fn key(&self) -> BlendKey {
         (self.sources, self.weights.map(f64::to_bits))
     }
 
-    fn parts(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+    /// The vertices and their weights.
+    pub(super) fn parts(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         self.sources.into_iter().zip(self.weights).filter(|part| part.1 > 0.0)
     }
 

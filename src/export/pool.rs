@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::blend::Blend;
+use super::blend::{Blend, BlendKey};
 use super::cut::Cuts;
 use super::{Baked, ExportError};
 use crate::scene::{Placement, Triangle};
@@ -99,7 +99,7 @@ struct Builder {
     /// Of the source's vertices, then of those that were added.
     coordinates: Vec<[f32; 2]>,
     /// By what they are made of and chart, the numbers of vertices that were added.
-    numbers: BTreeMap<(([u32; 3], [u64; 3]), ChartOf), u32>,
+    numbers: BTreeMap<(BlendKey, ChartOf), u32>,
     /// What was added: copies and blends.
     added: Vec<Blend>,
 }

@@ -57,6 +57,12 @@ pub fn nearest_on_segment(a: DVec2, b: DVec2, p: DVec2) -> DVec2 {
     a + d * ((p - a).dot(d) / length_squared).clamp(0.0, 1.0)
 }
 
+/// Whether `p` lies in a convex, counter-clockwise ring or on it.
+#[must_use]
+pub fn is_in_convex(ring: &[DVec2], p: DVec2) -> bool {
+    ring.iter().zip(ring.iter().cycle().skip(1)).all(|(&a, &b)| orient(a, b, p) >= 0.0)
+}
+
 /// The part of `ring` on the side of the line where `normal · p ≥ offset` (Sutherland and Hodgman 1974).
 ///
 /// A concave ring that falls apart stays joined by edges along the line; they enclose no area.

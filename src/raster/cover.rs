@@ -13,7 +13,7 @@ use crate::geom::polygon::contains;
 use crate::surface::Surface;
 use crate::trace::Tracer;
 
-/// What comes nearer to a surface than this many texels covers it.
+/// What comes nearer to a surface than this many texels, along their shorter side, covers it.
 const GAP: f64 = 0.25;
 
 /// A texel is searched for a place that is seen in a square of this many a side.
@@ -45,7 +45,7 @@ impl Cover<'_> {
     /// Whether something lies upon the surface at a point of its plane.
     pub(super) fn hides(&self, point: DVec2) -> bool {
         let frame = &self.surface.frame;
-        let texel = self.step[0].length().max(self.step[1].length());
+        let texel = self.step[0].length().min(self.step[1].length());
         let foot = frame.lift(point) + frame.normal * self.tracer.margin();
         self.tracer.occluded(foot, foot + frame.normal * (GAP * texel))
     }

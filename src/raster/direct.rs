@@ -17,8 +17,8 @@ use super::coverage::TexelSite;
 use super::fit::{FitTexel, LightSample, fit};
 use super::penumbra::{SmoothBlock, is_soft};
 use super::ways::TexelWays;
-use crate::geom::polygon::{contains, nearest_on_segment, rectangle};
-use crate::geom::{Bounds, Frame};
+use crate::geom::polygon::{contains, is_in_convex, nearest_on_segment, rectangle};
+use crate::geom::{Bounds, Frame, Ring};
 use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
@@ -76,8 +76,8 @@ pub(super) struct LitTexel {
     /// What arrives from the emitter at hand, and whether its shadow's edge is near.
     now: DVec3,
     is_at_edge: bool,
-    /// Whether some emitter's shadow may fall between here and the next texel.
-    pub is_crossed: bool,
+    /// Luminance of the light that shadows between here and the next texel may hide or let through.
+    pub doubtful: f64,
 }
 
 /// What is done where a shadow's edge crosses a texel.
@@ -103,7 +103,7 @@ impl LitTexel {
             covering: Covering::Seen,
             now: DVec3::ZERO,
             is_at_edge: false,
-            is_crossed: false,
+            doubtful: 0.0,
         }
     }
 }
@@ -133,8 +133,9 @@ impl DirectLight<'_> {
         let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
         let plane_from_texel = chart.texel_from_plane.inverse();
         let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
+        let outline = &chart.outline;
         for emitter in self.emitters {
-            let work = Shining { light: self, surface, plane_from_texel, cover, emitter };
+            let work = Shining { light: self, surface, outline, plane_from_texel, cover, emitter };
             let extent = extent(texels);
             let done = work.shine_on(texels, extent, Inherited { between: None, texels: usize::MAX });
             ways.add(&done.ways);
@@ -206,6 +207,8 @@ pub(super) fn texel_steps(chart: &Chart) -> [DVec2; 2] {
 struct Shining<'a> {
     light: &'a DirectLight<'a>,
     surface: &'a Surface,
+    /// What of the surface the chart shows.
+    outline: &'a Ring,
     plane_from_texel: DAffine2,
     cover: Cover<'a>,
     emitter: &'a Emitter,
@@ -334,9 +337,13 @@ impl Shining<'_> {
         let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
         for texel in texels.iter_mut() {
             texel.now = self.irradiance(texel.point, Between::Polygons(between), &mut evaluation);
-            texel.is_crossed = true;
             let light = luminance(texel.now);
             (least, most) = (least.min(light), most.max(light));
+        }
+        if self.light.edges == Edges::Once {
+            let middle = texels[texels.len() / 2].point;
+            let unoccluded = luminance(self.irradiance(middle, Between::Nothing, &mut evaluation));
+            texels.iter_mut().for_each(|t| t.doubtful += unoccluded);
         }
         let mut samples = Vec::new();
         let is_bright = self.light.edges == Edges::Fitted && most > DIM * self.light.typical;
@@ -388,7 +395,8 @@ impl Shining<'_> {
             let point = self.plane_from_texel.transform_point2(at);
             let is_inside = (outlines.is_empty() && !rings.is_empty())
                 || (contains(rings, point) && !self.is_at_outline(outlines, point));
-            if is_inside && !self.cover.hides(point) {
+            // What lies beyond a cut is another chart's.
+            if is_inside && is_in_convex(self.outline, point) && !self.cover.hides(point) {
                 let light = self.irradiance(point, Between::Polygons(between), evaluation);
                 samples.push(LightSample { at, light });
             }

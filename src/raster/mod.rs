@@ -12,11 +12,12 @@ mod direct;
 mod fit;
 mod locate;
 mod penumbra;
+mod seams;
 mod ways;
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::element::SurfaceAppearance;
@@ -35,6 +36,7 @@ pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
 use direct::{DirectLight, Edges, LitTexel, texel_steps};
 use locate::TriangleLocator;
+pub use seams::SeamReport;
 pub use ways::TexelWays;
 
 /// A finished lightmap page.
@@ -81,8 +83,8 @@ pub struct Lighting<'a> {
 pub struct PointLight {
     /// Irradiance.
     pub irradiance: DVec3,
-    /// Whether a shadow may fall between this point and the next.
-    pub is_crossed: bool,
+    /// Luminance of the light that shadows between this point and the next may hide or let through.
+    pub doubtful: f64,
 }
 
 /// What rasterizing took.
@@ -98,6 +100,8 @@ pub struct TexelCounts {
     pub ways: TexelWays,
     /// Evaluations of direct light and rays, emitters times points.
     pub effort: Effort,
+    /// How well the charts agree where they meet.
+    pub seams: SeamReport,
 }
 
 impl<'a> Lighting<'a> {
@@ -112,6 +116,12 @@ impl<'a> Lighting<'a> {
     #[must_use]
     pub fn surfaces(&self) -> &'a [Surface] {
         self.input.surfaces
+    }
+
+    /// How many emitters light the surfaces.
+    #[must_use]
+    pub fn emitters(&self) -> usize {
+        self.input.emitters.len()
     }
 
     /// The irradiance at the texel centres of a page of `size` texels that `chart` alone lies in, row by row;
@@ -130,7 +140,7 @@ impl<'a> Lighting<'a> {
         for texel in &texels {
             let at = texel.cell[1] as usize * size.0 as usize + texel.cell[0] as usize;
             let irradiance = texel.direct + texel.indirect;
-            light[at] = Some(PointLight { irradiance, is_crossed: texel.is_crossed });
+            light[at] = Some(PointLight { irradiance, doubtful: texel.doubtful });
         }
         light
     }
@@ -187,6 +197,16 @@ pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> (Lightmap, TexelCounts) 
             valid[at] = true;
         }
     }
+    counts.seams = seams::join(input.surfaces, atlas, &mut texels, &valid);
+    let finished = sites.par_iter().map(|site| {
+        let at = site.y as usize * size.0 as usize + site.x as usize;
+        let irradiance = DVec3::from_array(texels[at].map(f64::from));
+        let chart = &atlas.charts[site.chart as usize];
+        (at, quantity(input, chart, site.point, irradiance).as_vec3().to_array())
+    });
+    for (at, value) in finished.collect::<Vec<_>>() {
+        texels[at] = value;
+    }
     tracing::debug!(?counts, "texels");
     let before = valid.iter().filter(|&&v| v).count();
     dilate(&mut texels, &mut valid, size, atlas.padding);
@@ -229,7 +249,7 @@ fn buried_regions(input: &RasterInput) -> Vec<Vec<bool>> {
         .collect()
 }
 
-/// The finished values of one chart's texels, in `direct`.
+/// The irradiance of one chart's texels, in `direct`.
 fn chart_texels(
     lighting: &Lighting,
     chart: &Chart,
@@ -247,18 +267,23 @@ fn chart_texels(
     }
     lighting.add_indirect(surface, &mut texels);
     take_after_neighbours(&mut texels, |t| &mut t.indirect);
-    let half = 0.5 * (step[0].abs() + step[1].abs());
     for texel in &mut texels {
-        let irradiance = texel.direct + texel.indirect;
-        texel.direct = match input.options.quantity {
-            Quantity::Irradiance => irradiance,
-            Quantity::Radiance => irradiance / PI,
-            Quantity::Radiosity => {
-                let (min, max) = (texel.point - half, texel.point + half);
-                input.appearance.exitance(surface, min, max)
-                    + input.appearance.reflectance(surface, min, max) * irradiance
-            }
-        };
+        texel.direct += texel.indirect;
     }
     (texels, ways, effort)
+}
+
+/// What a texel holds that shows a place of a surface with this irradiance.
+fn quantity(input: &RasterInput, chart: &Chart, point: DVec2, irradiance: DVec3) -> DVec3 {
+    match input.options.quantity {
+        Quantity::Irradiance => irradiance,
+        Quantity::Radiance => irradiance / PI,
+        Quantity::Radiosity => {
+            let step = texel_steps(chart);
+            let half = 0.5 * (step[0].abs() + step[1].abs());
+            let (min, max) = (point - half, point + half);
+            input.appearance.exitance(chart.surface, min, max)
+                + input.appearance.reflectance(chart.surface, min, max) * irradiance
+        }
+    }
 }

@@ -138,6 +138,8 @@ pub struct LightmapReport {
     pub utilisation: f64,
     /// Size of the EXR.
     pub bytes: u64,
+    /// Size of the PNG that `MOZ_lightmap` names, 0 where there is none.
+    pub png_bytes: u64,
 }
 
 /// The energy ledger: `emitted = absorbed + escaped + unshot`, per channel.
@@ -223,7 +225,7 @@ mod tests {
         assert_eq!(keys(&json["texels"]), texels);
         let ways = ["behind", "lit", "umbra", "smooth", "crossed", "edge"];
         assert_eq!(keys(&json["texels"]["ways"]), ways);
-        let lightmap = ["width", "height", "texels_per_metre", "charts", "utilisation", "bytes"];
+        let lightmap = ["width", "height", "texels_per_metre", "charts", "utilisation", "bytes", "png_bytes"];
         assert_eq!(keys(&json["lightmap"]), lightmap);
         assert_eq!(keys(&json["energy"]), ["emitted", "absorbed", "escaped", "unshot"]);
     }

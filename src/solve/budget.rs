@@ -21,6 +21,15 @@ impl Round {
         Self { noise: 4.0 * error, tolerance: 12.0 * error }
     }
 
+    /// Follows light into narrow gaps, from one side to the other: elements stay as they are.
+    pub const IN_GAPS: Self = Self { noise: 8.0 * COARSEST, tolerance: f64::INFINITY };
+
+    /// Whether elements may be split.
+    #[must_use]
+    pub fn splits(&self) -> bool {
+        self.tolerance.is_finite()
+    }
+
     /// The last makes the light that the lightmap holds; its rays may leave this `error`.
     #[must_use]
     pub fn last(error: f64) -> Self {

@@ -20,6 +20,7 @@ use super::form_factor::point_to_disk;
 use super::umbra::Occluders;
 use crate::cob::{Cob, CobState, Prism, prism_height};
 use crate::element::{Facet, NONE, SurfaceAppearance};
+use crate::geom::Bounds;
 use crate::light::luminance;
 use crate::options::{BakeOptions, Refine, Toggle};
 use crate::trace::Tracer;
@@ -293,7 +294,9 @@ impl<'a> Receiving<'a> {
         let interpolated = e.flat(values).at(e.place(e.centroid));
         self.middle = Some(middle);
         let spread = values.iter().map(|&v| luminance((v - middle).abs())).fold(0.0, f64::max);
-        Arriving { middle, interpolated, spread }
+        let block = Bounds::of(self.facet.hull(element));
+        let is_near = self.emitter.distance(block) < e.size();
+        Arriving { middle, interpolated, spread, is_near }
     }
 
     fn value(&mut self, sample: u32, between: &[u32]) -> DVec3 {
@@ -319,14 +322,36 @@ struct Arriving {
     interpolated: DVec3,
     /// The most by which a sample's luminance differs from the middle's.
     spread: f64,
+    /// Whether the emitter is nearer than the element is large.
+    is_near: bool,
 }
 
 impl Arriving {
     fn error(&self) -> f64 {
-        luminance((self.middle - self.interpolated).abs())
+        let missed = luminance((self.middle - self.interpolated).abs());
+        if self.is_near { missed.max(NEAR_SHARE * self.spread) } else { missed }
     }
 }
+
+/// Where the emitter is nearer than the element is large, this share of the difference between the samples and the
+/// middle counts as error: light may fall off within less than the element, and be half-way down in the middle by
+/// chance, as under the rim of a lamp that hangs a finger below the ceiling.
+const NEAR_SHARE: f64 = 0.05;
 
 /// Where occluders are about, corners may differ from the middle by this fraction of the light before the
 /// element is split: the interpolation of a shadow's edge can be right in the middle by chance.
 const SHADOW_SPREAD: f64 = 0.25;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half of the light of two corners and none at the others is right in the middle whatever lies between.
+    #[test]
+    fn near_an_emitter_a_middle_that_is_right_is_not_believed() {
+        let [half, spread] = [DVec3::splat(50.0), DVec3::splat(50.0)];
+        let of = |is_near| Arriving { middle: half, interpolated: half, spread: luminance(spread), is_near };
+        assert!(of(false).error() < 1e-9);
+        assert!(of(true).error() > GRADIENT_TOLERANCE * luminance(half));
+    }
+}

@@ -245,6 +245,21 @@ impl Emitter {
         }
     }
 
+    /// No place in `block` is nearer to it than this, metres.
+    #[must_use]
+    pub fn distance(&self, block: Bounds) -> f64 {
+        let own = match self {
+            Self::Area(area) => Bounds::of(area.hull.iter().copied()),
+            Self::Punctual(light) => match light.kind {
+                PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {
+                    Bounds::of([position])
+                }
+                PunctualKind::Directional { .. } => return f64::INFINITY,
+            },
+        };
+        (own.min - block.max).max(block.min - own.max).max(DVec3::ZERO).length()
+    }
+
     /// The shaft from a convex receiving polygon to the emitter.
     #[must_use]
     pub fn shaft(&self, receiver: &[DVec3], tracer: &Tracer) -> Shaft {
@@ -408,6 +423,13 @@ mod tests {
             assert!((exact - rays).abs() < 0.1 * lamp.unoccluded(floor_point(x)), "{x}: {exact} {rays}");
         }
         assert!(e.effort.rays > 0 && e.effort.exact == 4);
+    }
+
+    #[test]
+    fn distances_are_between_the_nearest_places() {
+        let block = Bounds { min: DVec3::new(0.8, -1.0, 0.0), max: DVec3::new(2.0, 1.0, 1.6) };
+        // 0.3 to the side of the lamp's edge and 0.4 below it.
+        assert!((Emitter::Area(lamp()).distance(block) - 0.5).abs() < 1e-12);
     }
 
     #[test]

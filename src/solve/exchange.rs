@@ -87,6 +87,13 @@ impl Exchange {
         Self { rows, rays: counts.iter().map(|c| u64::from(c.rays)).sum() }
     }
 
+    /// Two patches of one square metre that see nothing but each other.
+    #[cfg(test)]
+    pub(super) fn face_to_face() -> Self {
+        let row = |to| Row { factors: vec![(to, 1.0)], remainder: 1.0, escaping: 0.0, onto_backs: 0.0 };
+        Self { rows: vec![row(1), row(0)], rays: 0 }
+    }
+
     /// The patches that receive from `shooter`, with the power that each receives per unit of its radiosity.
     pub fn received(&self, shooter: usize) -> impl Iterator<Item = (usize, f64)> {
         let row = &self.rows[shooter];

@@ -27,7 +27,7 @@ use crate::element::{Facet, Shading};
 use crate::geom::Frame;
 use crate::light::luminance;
 use crate::options::Refine;
-use crate::trace::FanStack;
+use crate::trace::{FanStack, Hit};
 
 /// In the dark, errors are measured by this fraction of the scene's mean light.
 pub(super) const LEAST_REFERENCE: f64 = 0.5;
@@ -48,6 +48,13 @@ const FLAT: f64 = 1.34;
 
 /// A hot spot that gives less than this fraction of the light is left out.
 const HOT_NEGLIGIBLE: f64 = 2e-5;
+
+/// A place of which more than this share of the rays meets something within the receiver's reach is in a gap.
+const ENCLOSED: f64 = 0.75;
+
+/// Rounds in a row in which light in a gap may stay as it is before it counts as settled: it comes to one side by
+/// way of the other.
+const PATIENCE: u32 = 2;
 
 /// What gathering took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -83,25 +90,33 @@ pub struct Source<'a> {
     pub directions: &'a Directions,
 }
 
-/// Gathers what `source` reflects on all facets, in place of the reflected light that they had. `receivers`
-/// holds the elements to begin with: of each facet, those that together cover it.
+/// Gathers what `source` reflects, in place of the reflected light that there was. `receivers` holds the elements
+/// to begin with, by facet; the others keep what they have.
+///
+/// Returns, by facet, the elements in narrow gaps, too, whose light has not settled: that changed by more than a
+/// fraction `unsettled` of it, now or in the round before.
 pub fn gather(
     pass: &DirectPass,
     source: Source,
     receivers: &[Vec<Receiver>],
-    round: Round,
+    (round, unsettled): (Round, f64),
     facets: &mut [Facet],
-) -> GatherCounts {
-    let counts: Vec<GatherCounts> = facets
+) -> (GatherCounts, Vec<Vec<Receiver>>) {
+    let counts: Vec<(GatherCounts, Vec<Receiver>)> = facets
         .par_iter_mut()
         .zip(receivers)
         .map(|(facet, receivers)| {
-            facet.elements.iter_mut().for_each(|e| e.indirect = Shading::default());
+            if receivers.is_empty() {
+                return (GatherCounts::default(), Vec::new());
+            }
             let mut gathering = Gathering {
                 pass,
                 source,
                 round,
                 level: Level::LEAST,
+                receiver: Receiver { element: 0, contrast: 0.0, reach: 0.0, idle: 0 },
+                unsettled,
+                enclosed: Vec::new(),
                 stack: FanStack::default(),
                 nearby: Nearby::default(),
                 evaluation: Evaluation::new(Precision::HOT_SPOT),
@@ -110,18 +125,19 @@ pub fn gather(
                 counts: GatherCounts::default(),
             };
             for receiver in receivers {
+                gathering.receiver = *receiver;
                 gathering.level = level_for(receiver.contrast, round.noise);
                 let before = gathering.counts.places;
                 gathering.receive(receiver.element);
                 gathering.counts.contrasts.add(receiver.contrast, gathering.counts.places - before);
             }
             gathering.counts.rays += gathering.evaluation.effort.rays;
-            gathering.counts
+            (gathering.counts, gathering.enclosed)
         })
         .collect();
     let mut total = GatherCounts::default();
-    counts.iter().for_each(|c| total.add(c));
-    total
+    counts.iter().for_each(|(c, _)| total.add(c));
+    (total, counts.into_iter().map(|(_, enclosed)| enclosed).collect())
 }
 
 /// One facet gathering.
@@ -131,6 +147,11 @@ struct Gathering<'a> {
     round: Round,
     /// How many of the directions a place takes.
     level: Level,
+    /// Where the elements at hand began.
+    receiver: Receiver,
+    /// Elements in narrow gaps whose light changed by more than this fraction of it.
+    unsettled: f64,
+    enclosed: Vec<Receiver>,
     stack: FanStack,
     nearby: Nearby,
     /// For hot spots.
@@ -147,6 +168,8 @@ struct Gathered {
     irradiance: DVec3,
     /// Harmonic mean distance of what the rays met, metres.
     distance: f64,
+    /// Whether most of the rays met something near.
+    is_enclosed: bool,
 }
 
 impl Gathering<'_> {
@@ -156,9 +179,12 @@ impl Gathering<'_> {
         let least = self.pass.indirect_threshold;
         if size <= least {
             let gathered = self.at(self.facet.centre(element));
-            self.facet.elements[element as usize].indirect =
-                Shading { corners: [gathered.irradiance; 4], bulge: DVec3::ZERO };
+            let shading = Shading { corners: [gathered.irradiance; 4], bulge: DVec3::ZERO };
+            self.keep(element, shading, gathered.is_enclosed);
             return;
+        }
+        if e.is_uneven {
+            return self.receive_in_parts(element);
         }
         let samples = e.samples;
         let places = samples.map(|sample| self.sample(sample));
@@ -166,25 +192,57 @@ impl Gathering<'_> {
         let mut shading = self.facet.elements[element as usize].flat(values);
         let nearest = places.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
         let (mut middle, mut is_uneven) = (None, false);
-        if self.may_split(element) {
+        if self.round.splits() && self.may_split(element) {
             if size > FLAT * self.round.tolerance.sqrt() * nearest {
                 let gathered = self.at(self.facet.centre(element));
                 is_uneven = self.is_missed_in_the_middle(element, &shading, values, gathered);
                 shading = self.facet.elements[element as usize].shading(values, gathered.irradiance);
                 middle = Some(gathered);
             }
-            is_uneven = is_uneven || self.is_missed_under_cover(element, &shading);
+            is_uneven = is_uneven || self.is_missed_nearby(element, &shading);
         }
         if is_uneven && self.part(element, values) {
             self.places.resize(self.facet.samples.len(), None);
             if let Some(middle) = middle {
                 self.hand_down(element, middle);
             }
-            for child in self.facet.elements[element as usize].children() {
-                self.receive(child);
-            }
+            self.facet.elements[element as usize].is_uneven = true;
+            self.receive_in_parts(element);
         } else {
-            self.facet.elements[element as usize].indirect = shading;
+            let is_enclosed = places.iter().chain(&middle).any(|p| p.is_enclosed);
+            self.keep(element, shading, is_enclosed);
+        }
+    }
+
+    /// Takes down what an element received.
+    fn keep(&mut self, element: u32, shading: Shading, is_enclosed: bool) {
+        let e = &mut self.facet.elements[element as usize];
+        e.is_enclosed = is_enclosed;
+        let before = std::mem::replace(&mut e.indirect, shading);
+        if is_enclosed {
+            let idle = if self.changes(element, &shading, &before) { 0 } else { self.receiver.idle + 1 };
+            if idle < PATIENCE {
+                self.enclosed.push(Receiver { element, idle, ..self.receiver });
+            }
+        }
+    }
+
+    fn changes(&self, element: u32, shading: &Shading, before: &Shading) -> bool {
+        let (direct, _) = self.facet.received(element, self.facet.elements[element as usize].centroid);
+        let places = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        places.into_iter().map(DVec2::from).any(|t| {
+            let (now, before) = (shading.at(t), before.at(t));
+            let light = luminance(direct + now).max(LEAST_REFERENCE * self.pass.typical);
+            luminance((now - before).abs()) > self.unsettled * light
+        })
+    }
+
+    fn receive_in_parts(&mut self, element: u32) {
+        let e = &mut self.facet.elements[element as usize];
+        e.indirect = Shading::default();
+        e.is_enclosed = false;
+        for child in self.facet.elements[element as usize].children() {
+            self.receive(child);
         }
     }
 
@@ -202,21 +260,37 @@ impl Gathering<'_> {
             let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
             error = differences.map(|d| NEAR_SHARE * d).fold(error, f64::max);
         }
-        error > self.tolerated(element, e.centroid, middle)
+        error > self.tolerated(element, e.centroid, middle.irradiance)
     }
 
-    /// Whether something stands close over the element where its light is not what `shading` says.
-    fn is_missed_under_cover(&mut self, element: u32, shading: &Shading) -> bool {
-        let Some(p) = self.nearby.most_covered(self.pass.tracer, self.facet, element) else { return false };
-        let gathered = self.at(self.facet.receiving(p));
+    /// Whether something stands close over the element, or on it, where its light is not what `shading` says.
+    fn is_missed_nearby(&mut self, element: u32, shading: &Shading) -> bool {
+        let tracer = self.pass.tracer;
+        self.nearby.look(tracer, self.facet, element);
+        let covered = self.nearby.most_covered(tracer, self.facet, element);
+        if covered.is_some_and(|p| self.is_missed_at(p, element, shading)) {
+            return true;
+        }
+        let field = self.source.field;
+        let reflected = |hit: &Hit, at| luminance(field.radiosity(tracer, hit, at).as_dvec3());
+        let foot = self.nearby.brightest_foot(tracer, self.facet, element, reflected);
+        foot.is_some_and(|foot| {
+            let e = &self.facet.elements[element as usize];
+            foot.gives > self.tolerated(element, foot.place, shading.at(e.place(foot.place)))
+                && self.is_missed_at(foot.place, element, shading)
+        })
+    }
+
+    fn is_missed_at(&mut self, p: DVec2, element: u32, shading: &Shading) -> bool {
+        let gathered = self.at(self.facet.receiving(p)).irradiance;
         let shading = shading.at(self.facet.elements[element as usize].place(p));
-        luminance((shading - gathered.irradiance).abs()) > self.tolerated(element, p, gathered)
+        luminance((shading - gathered).abs()) > self.tolerated(element, p, gathered)
     }
 
     /// The error that is tolerated at a place of an element.
-    fn tolerated(&self, element: u32, p: DVec2, gathered: Gathered) -> f64 {
+    fn tolerated(&self, element: u32, p: DVec2, gathered: DVec3) -> f64 {
         let (direct, _) = self.facet.received(element, p);
-        let light = luminance(direct + gathered.irradiance);
+        let light = luminance(direct + gathered);
         self.round.tolerance * light.max(LEAST_REFERENCE * self.pass.typical)
     }
 
@@ -282,17 +356,23 @@ impl Gathering<'_> {
         let tracer = self.pass.tracer;
         let fans = self.source.directions.fans(self.level);
         let Frame { u, v, normal, .. } = self.facet.frame;
-        let (mut sum, mut nearness) = (DVec3::ZERO, 0.0);
+        let (mut sum, mut nearness, mut near) = (DVec3::ZERO, 0.0, 0_u32);
+        let reach = self.receiver.reach;
         let Source { field, hot_spots, .. } = self.source;
         tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at| {
             sum += field.radiosity(tracer, hit, at).as_dvec3();
             nearness += 1.0 / hit.distance.max(tracer.margin());
+            near += u32::from(hit.distance < reach);
         });
         let rays = self.level.rays() as f64;
         self.counts.places += 1;
         self.counts.rays += self.level.rays() as u64;
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
         let hot = irradiance_by_rays(hot_spots, point, tracer, negligible, &mut self.evaluation);
-        Gathered { irradiance: sum / rays + hot, distance: rays / nearness }
+        Gathered {
+            irradiance: sum / rays + hot,
+            distance: rays / nearness,
+            is_enclosed: f64::from(near) > ENCLOSED * rays,
+        }
     }
 }

@@ -24,7 +24,7 @@ pub mod visible;
 
 use glam::DVec3;
 
-use crate::element::{Facet, SurfaceAppearance};
+use crate::element::{Facet, Shading, SurfaceAppearance};
 use crate::light::luminance;
 use crate::options::BakeOptions;
 use crate::scene::PunctualLight;
@@ -38,8 +38,17 @@ use gather::{GatherCounts, Source, gather};
 use hemisphere::Directions;
 use hot::HotSpots;
 use locate::FacetLocator;
-use patches::{Energy, Patches};
+use patches::{Energy, Patches, Receiver};
 use umbra::Occluders;
+
+/// Light in narrow gaps is followed for so many reflections at most,
+const MOST_SWEEPS: u32 = 12;
+
+/// or until none changes it by more than this fraction,
+const UNSETTLED: f64 = 0.01;
+
+/// and at first everywhere.
+const ANY: f64 = -1.0;
 
 /// What the solver works on.
 pub struct Problem<'a> {
@@ -152,7 +161,9 @@ pub fn solve(
     })
 }
 
-/// Lets all elements gather what the patches reflect in the end; `None` when told to stop. `received` is the
+/// Lets all elements gather what the patches reflect in the end, in a few rounds, of which each reads what the one
+/// before wrote; after the first, light is followed into narrow gaps, and after all but the last it is brought to
+/// balance by the patches. `None` when told to stop. `received` is the
 /// direct light of the patches as the mesh has it. Returns the error that the rays were to leave, too.
 fn gather_reflected(
     pass: &DirectPass,
@@ -170,38 +181,68 @@ fn gather_reflected(
     let mut counts = GatherCounts::default();
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
     let texels = area / pass.indirect_threshold.powi(2);
-    let mut run = |round: Round, done: f64| {
+    let gather_from = |receivers: &[Vec<Receiver>], round: (Round, f64), facets: &mut [Facet]| {
         let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
         let hot_spots = hot.emitters(&field, facets);
         let source = Source { field: &field, hot_spots: &hot_spots, directions: &directions };
-        let own = gather(pass, source, &receivers, round, facets);
-        tracing::debug!(
-            ?round,
-            places = own.places,
-            rays = own.rays,
-            hot_spots = hot_spots.len(),
-            "gathered"
-        );
+        let (own, unsettled) = gather(pass, source, receivers, round, facets);
+        tracing::debug!(?round, places = own.places, rays = own.rays, "gathered");
+        (own, unsettled)
+    };
+    let mut gaps_are_dark = false;
+    let mut approach = |round: Round, done: f64, facets: &mut [Facet]| {
+        let before = shadings(facets);
+        let (own, mut gaps) = gather_from(&receivers, (round, ANY), facets);
         counts.add(&own);
-        progress(done).then_some(own)
+        if !std::mem::replace(&mut gaps_are_dark, true) {
+            // What patches say of narrow gaps may be off by any amount. Light comes in from outside.
+            darken(&gaps, facets);
+            for _ in 0..MOST_SWEEPS {
+                let (own, left) = gather_from(&gaps, (Round::IN_GAPS, UNSETTLED), facets);
+                counts.add(&own);
+                gaps = left;
+                if gaps.iter().all(Vec::is_empty) {
+                    break;
+                }
+            }
+        }
+        patches.settle(&before, round.tolerance, facets);
+        progress(done).then_some(own.contrasts)
     };
     let error = match pass.options.gather_error {
         Some(error) => {
-            run(Round::first(error), 0.8)?;
+            approach(Round::first(error), 0.8, facets)?;
             error
         }
         None => {
             let mut round = Round::first(COARSEST);
-            let mut error = affordable_error(&run(round, 0.75)?.contrasts, round, texels);
+            let mut error = affordable_error(&approach(round, 0.75, facets)?, round, texels);
             if error < 0.5 * COARSEST {
                 round = Round::first(error);
-                error = affordable_error(&run(round, 0.8)?.contrasts, round, texels);
+                error = affordable_error(&approach(round, 0.8, facets)?, round, texels);
             }
             error
         }
     };
-    run(Round::last(error), 1.0)?;
+    counts.add(&gather_from(&receivers, (Round::last(error), ANY), facets).0);
+    if !progress(1.0) {
+        return None;
+    }
     Some((counts, error))
+}
+
+/// The reflected light that elements hold themselves, by facet and element.
+fn shadings(facets: &[Facet]) -> Vec<Vec<Shading>> {
+    facets.iter().map(|f| f.elements.iter().map(|e| e.indirect).collect()).collect()
+}
+
+/// Takes the reflected light of elements away.
+fn darken(elements: &[Vec<Receiver>], facets: &mut [Facet]) {
+    for (facet, receivers) in facets.iter_mut().zip(elements) {
+        for receiver in receivers {
+            facet.elements[receiver.element as usize].indirect = Shading::default();
+        }
+    }
 }
 
 /// Glowing regions and punctual lights, each the strongest first; ties keep the scene's order.

@@ -20,6 +20,18 @@ use crate::trace::Tracer;
 /// What emitters sent is scaled by no more than this to close the energy balance.
 const MOST_SCALING: f64 = 2.0;
 
+/// After a round of gathering light is scaled by no more than this to bring it to balance.
+const MOST_SETTLING: f64 = 2.0;
+
+/// A gain by less than this share of the tolerance may be the rays' own error.
+const GAIN_BY_CHANCE: f64 = 1.0 / 3.0;
+
+/// Changes are followed until this fraction of them is left,
+const LEFT_UNSETTLED: f64 = 0.01;
+
+/// or they were reflected so many times.
+const MOST_REFLECTIONS: u32 = 24;
+
 /// A patch: an element that shoots.
 #[derive(Clone, Debug)]
 pub struct Patch {
@@ -107,7 +119,13 @@ impl Patches {
             let deviation = (square - mean * mean).max(0.0).sqrt();
             let light = luminance(patch.direct + patch.indirect).max(least);
             let contrast = if light > 0.0 { deviation / light } else { 0.0 };
-            receivers[patch.facet as usize].push(Receiver { element: patch.element, contrast });
+            let size = facets[patch.facet as usize].elements[patch.element as usize].size();
+            receivers[patch.facet as usize].push(Receiver {
+                element: patch.element,
+                contrast,
+                reach: REACH * size,
+                idle: 1,
+            });
         }
         receivers
     }
@@ -221,6 +239,65 @@ impl Patches {
         self.shots += 1;
     }
 
+    /// Brings the elements' reflected light closer to balance after a round of gathering, before which the elements
+    /// had `before` of it: by facet and element.
+    ///
+    /// A round carries light on by one reflection only. What it changed will be reflected, too, and again: the
+    /// patches tell how much of that arrives where, coarsely, and the elements' light is scaled so that each patch
+    /// has it (a two-grid iteration: Brandt, "Multi-Level Adaptive Solutions to Boundary-Value Problems", 1977).
+    /// What changed in narrow gaps does not come out of them and is left out, as is a loss of less than
+    /// the round's `tolerance`, a fraction of the light: patches lose no light, interpolation does, and a loss carried
+    /// on would grow.
+    pub fn settle(&self, before: &[Vec<Shading>], tolerance: f64, facets: &mut [Facet]) {
+        let open: Vec<OpenLight> = self
+            .patches
+            .par_iter()
+            .map(|p| OpenLight::of(&facets[p.facet as usize], p.element, &before[p.facet as usize]))
+            .collect();
+        let changes = open
+            .iter()
+            .zip(&self.patches)
+            .map(|(open, patch)| {
+                let gain = (open.change - GAIN_BY_CHANCE * tolerance * open.light).max(DVec3::ZERO);
+                let loss = (-open.change - tolerance * open.light).max(DVec3::ZERO);
+                (gain - loss) / patch.area
+            })
+            .collect();
+        for ((patch, open), more) in self.patches.iter().zip(&open).zip(self.all_that_follows(changes)) {
+            let more = more * open.area;
+            let scale = DVec3::select(open.light.cmpgt(DVec3::ZERO), 1.0 + more / open.light, DVec3::ONE);
+            let scale = scale.clamp(DVec3::splat(1.0 / MOST_SETTLING), DVec3::splat(MOST_SETTLING));
+            facets[patch.facet as usize].scale_open_indirect(patch.element, scale);
+        }
+    }
+
+    /// What arrives at each patch when all reflect `changes` of their irradiance, once and again.
+    fn all_that_follows(&self, changes: Vec<DVec3>) -> Vec<DVec3> {
+        let power = |changes: &[DVec3]| -> f64 {
+            let of = |(p, c): (&Patch, &DVec3)| p.area * c.abs().element_sum();
+            self.patches.iter().zip(changes).map(of).sum()
+        };
+        let enough = LEFT_UNSETTLED * power(&changes);
+        let (mut sum, mut now) = (vec![DVec3::ZERO; changes.len()], changes);
+        for _ in 0..MOST_REFLECTIONS {
+            // Factors are symmetric but for the remainders, which are close to 1: a patch gathers what others send.
+            now = self
+                .patches
+                .par_iter()
+                .enumerate()
+                .map(|(i, patch)| {
+                    let arriving = |(j, g): (usize, f64)| self.patches[j].reflectance * now[j] * g;
+                    self.exchange.received(i).map(arriving).sum::<DVec3>() / patch.area
+                })
+                .collect();
+            sum.iter_mut().zip(&now).for_each(|(sum, now)| *sum += *now);
+            if power(&now) <= enough {
+                break;
+            }
+        }
+        sum
+    }
+
     /// Writes what patches received by reflection into their elements, continuous where it was constant: a
     /// corner takes the mean of the patches of its region that meet there, no more than `grain` metres apart.
     pub fn spread_indirect(&self, facets: &mut [Facet], grain: f64) {
@@ -254,6 +331,37 @@ pub struct Receiver {
     pub element: u32,
     /// Standard deviation of the luminance that a ray meets, as a fraction of the light there.
     pub contrast: f64,
+    /// What is nearer than this is too near for patches to tell what it reflects, metres.
+    pub reach: f64,
+    /// In how many rounds of late its light did not change.
+    pub idle: u32,
+}
+
+/// Patches tell little of what is nearer than this fraction of their size.
+const REACH: f64 = 0.25;
+
+/// Reflected light on what of a patch does not lie in narrow gaps.
+struct OpenLight {
+    /// Square metres.
+    area: f64,
+    /// Power.
+    light: DVec3,
+    /// By how much it was less before.
+    change: DVec3,
+}
+
+impl OpenLight {
+    fn of(facet: &Facet, element: u32, before: &[Shading]) -> Self {
+        let mut open = Self { area: 0.0, light: DVec3::ZERO, change: DVec3::ZERO };
+        for leaf in facet.leaves_of(element).into_iter().filter(|&l| !facet.is_enclosed(l)) {
+            let e = &facet.elements[leaf as usize];
+            let (_, light) = facet.mean(leaf);
+            open.area += e.area;
+            open.light += e.area * light;
+            open.change += e.area * (light - facet.indirect_before(before, leaf, e.centroid));
+        }
+        open
+    }
 }
 
 /// Mean and mean square of the luminance that a patch reflects; hot leaves count as no more than `cap`.
@@ -283,5 +391,32 @@ impl Patch {
             indirect: DVec3::ZERO,
             unshot: DVec3::ZERO,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of two halves that see each other: 1/2 + 1/8 + 1/32 + … comes to the other, half of that back.
+    #[test]
+    fn changes_are_followed_to_their_end() {
+        let patch = Patch {
+            facet: 0,
+            element: 0,
+            area: 1.0,
+            reflectance: DVec3::splat(0.5),
+            direct: DVec3::ZERO,
+            indirect: DVec3::ZERO,
+            unshot: DVec3::ZERO,
+        };
+        let patches = Patches {
+            patches: vec![patch.clone(), patch],
+            exchange: Exchange::face_to_face(),
+            energy: Energy::default(),
+            shots: 0,
+        };
+        let [own, other] = patches.all_that_follows(vec![DVec3::ONE, DVec3::ZERO])[..] else { panic!() };
+        assert!((own.x - 1.0 / 3.0).abs() < 0.01 && (other.x - 2.0 / 3.0).abs() < 0.01, "{own} {other}");
     }
 }

@@ -19,7 +19,7 @@ pub enum UnwrapError {
 
     /// The density asked for needs more than the largest page.
     #[error(
-        "{charts} charts at {texels_per_metre} texels a metre do not fit into {side} × {side} texels; ask for a smaller --texels-per-metre"
+        "{charts} charts at {texels_per_metre} texels a metre do not fit into {side} × {side} texels; ask for fewer texels (--texels-per-metre, --budget)"
     )]
     TooLarge {
         /// How many charts there are.

@@ -5,30 +5,39 @@
 //! shift. The extreme corners therefore lie on texel centres, and a bilinear lookup inside a chart of
 //! `w × h` texels touches exactly `(w + 1) × (h + 1)` of them. No chart is thinner than one texel.
 //!
-//! Two packers share one trait: a skyline over bounding rectangles, quick and always there, and
-//! xatlas (feature `xatlas`), which sees the charts' shapes and nests them. The skyline's density
-//! is where xatlas's search begins, and the answer where xatlas finds nothing better.
+//! Two packers share one trait: one for bounding rectangles, quick and always there, and
+//! xatlas (feature `xatlas`), which sees the charts' shapes and nests them in a square page. The
+//! first one's answer is where xatlas's search begins, and the answer where xatlas finds nothing better.
+//!
+//! Pages need not be square. Where the page is given, charts grow until it is full (`fill`); where
+//! the charts' density is given, the page becomes as small as they allow (`least`).
 
 mod bit_grid;
-mod density;
 mod error;
+mod fill;
 pub(crate) mod footprint;
+mod layout;
+mod least;
+mod max_rects;
 mod pack;
 mod part;
 mod shape;
-mod skyline;
 #[cfg(feature = "xatlas")]
 mod xatlas;
 
 pub use error::UnwrapError;
-pub(crate) use part::clip;
 pub use part::{Part, whole};
+pub(crate) use part::{clip, weighed_area};
 
 use glam::{DAffine2, DVec2};
 
 use crate::geom::Ring;
-use crate::options::Resolution;
 use crate::surface::Surface;
+use fill::fill;
+use layout::density_of_texels;
+use least::least_page;
+use pack::{LARGEST_SIDE, Page};
+use shape::Shape;
 
 /// Where each surface lies in the lightmap.
 #[derive(Clone, Debug)]
@@ -90,33 +99,84 @@ impl Chart {
     }
 }
 
+/// What decides how large the page becomes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Room {
+    /// The page is a square of this side, texels, and charts are as dense as fit; columns and rows
+    /// that no chart reaches are cut off.
+    Square(u32),
+    /// This many texels a metre; the page is as small as the packers reach.
+    Density(f64),
+    /// About this many texels in all, with padding; the page is as small as the packers reach.
+    Texels(f64),
+}
+
 /// What [`unwrap`] can be told.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnwrapOptions {
-    /// The page's side, or the density from which it follows.
-    pub resolution: Resolution,
+    /// How large the page becomes.
+    pub room: Room,
+    /// Charts are not denser than this, texels a metre, where more would fit. Default: no limit.
+    pub most: Option<f64>,
     /// Free texels around each chart's bilinear footprint. Default: 1, which leaves two between
     /// charts, enough for bilinear filtering with a graphics card's fixed-point weights; 0 where
     /// the charts do not fit otherwise.
     pub padding: Option<u32>,
 }
 
-/// Lays a chart for each of the surfaces' `parts` (ordered by surface) out in one square page.
+impl UnwrapOptions {
+    /// The defaults in a page of this size.
+    #[must_use]
+    pub fn new(room: Room) -> Self {
+        Self { room, most: None, padding: None }
+    }
+}
+
+/// Lays a chart for each of the surfaces' `parts` (ordered by surface) out in one page.
 ///
-/// With [`Resolution::Size`] the page has exactly that side, and the density is the largest that
-/// the search finds to fit. With [`Resolution::TexelsPerMetre`] the page's side is the least
-/// multiple of 4 that the packers reach. The same input gives the same atlas.
+/// A part's own weight multiplies the density. Sides of the page are multiples of 4, but for one that
+/// [`Room::Square`] gives. The same input gives the same atlas.
 ///
 /// # Errors
 ///
 /// [`UnwrapError::TooSmall`] if the charts do not fit even with one texel each,
 /// [`UnwrapError::TooLarge`] if the density asked for needs a page above 16384 texels.
 pub fn unwrap(surfaces: &[Surface], parts: &[Part], options: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
-    let shapes: Vec<_> = parts.iter().map(|part| shape::Shape::of(part, &surfaces[part.surface])).collect();
+    let shapes: Vec<_> = parts.iter().map(|part| Shape::of(part, &surfaces[part.surface])).collect();
     let padding = options.padding.unwrap_or(1);
-    let atlas = density::lay_out(&shapes, options.resolution, padding);
+    let atlas = lay_out(&shapes, options, padding);
     match (&atlas, options.padding) {
-        (Err(_), None) => density::lay_out(&shapes, options.resolution, 0).or(atlas),
+        (Err(_), None) => lay_out(&shapes, options, 0).or(atlas),
         _ => atlas,
     }
+}
+
+/// Lays `shapes` out with that much padding.
+fn lay_out(shapes: &[Shape], options: &UnwrapOptions, padding: u32) -> Result<Atlas, UnwrapError> {
+    let padding = padding.min(LARGEST_SIDE);
+    let most = options.most.unwrap_or(f64::INFINITY);
+    let charts = shapes.len();
+    let (density, longest) = match options.room {
+        Room::Square(side) => {
+            let side = side.min(LARGEST_SIDE);
+            let page = Page { width: side, height: side, padding };
+            let too_small = UnwrapError::TooSmall { charts, padding, side };
+            let layout = fill(shapes, page, most).ok_or(too_small.clone())?;
+            if layout.texels_per_metre < most {
+                return layout.atlas(shapes, page).ok_or(too_small);
+            }
+            // There is room to spare.
+            (most, side)
+        }
+        Room::Density(density) => (density.min(most), LARGEST_SIDE),
+        Room::Texels(texels) => {
+            let area: f64 = shapes.iter().map(Shape::weighed_area).sum();
+            let bound = (texels / area).sqrt();
+            let most = most.min(if bound.is_finite() { bound } else { 1.0 });
+            (density_of_texels(shapes, texels, padding, most), LARGEST_SIDE)
+        }
+    };
+    let too_large = UnwrapError::TooLarge { charts, texels_per_metre: density, side: longest };
+    let (page, layout) = least_page(shapes, density, padding, longest).ok_or(too_large.clone())?;
+    layout.atlas(shapes, page).ok_or(too_large)
 }

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::geom::Ring;
-use crate::geom::polygon::{clip_half_plane, rectangle};
+use crate::geom::polygon::{clip_half_plane, rectangle, signed_area};
 use crate::surface::Surface;
 
 /// A part of a surface that gets a chart of its own.
@@ -25,6 +25,14 @@ pub fn whole(surfaces: &[Surface]) -> Vec<Part> {
         Part { surface, outline: rectangle(min, max).to_vec(), weight: DVec2::ONE }
     };
     surfaces.iter().enumerate().map(of).collect()
+}
+
+/// The area of what a part holds of its surface, as many times over as its weights say.
+pub(crate) fn weighed_area(part: &Part, surface: &Surface) -> f64 {
+    let triangles = surface.regions.iter().flat_map(|r| &r.triangles);
+    let inside = triangles.map(|&t| clip(t, &part.outline));
+    let area: f64 = inside.map(|ring| signed_area(&ring)).sum();
+    area.abs() * part.weight.element_product()
 }
 
 /// What of a triangle lies in a convex polygon, counter-clockwise: the triangle itself where that is all of it.

@@ -57,6 +57,11 @@ impl Shape {
         }
     }
 
+    /// The texels that it takes up at one texel a metre.
+    pub(super) fn weighed_area(&self) -> f64 {
+        self.area * self.weight.element_product()
+    }
+
     /// The convex hull of the triangles, counter-clockwise, without collinear corners
     /// (Andrew's monotone chain, 1979); fewer than three corners if there is no area.
     #[cfg(feature = "xatlas")]

@@ -42,7 +42,7 @@ const KIND_MASK: u32 = 0xe000_0000;
 const MOST_WORK: u64 = 120_000_000;
 
 /// Nesting is tried where the bounding rectangles waste more than this share of their area. Below
-/// it xatlas, which looks at the page's extent alone, packs no denser than the skyline does.
+/// it xatlas, which looks at the page's extent alone, packs no denser than rectangles lie.
 const LEAST_WASTE: f64 = 0.03;
 
 /// The packer that lets charts nest.
@@ -51,11 +51,11 @@ pub(super) struct Nesting(());
 
 impl Nesting {
     /// The packer, where there is room for nesting and the search ends in reasonable time.
-    pub(super) fn worthwhile(shapes: &[Shape], side: u32) -> Option<Self> {
-        let work = (shapes.len() as u64).saturating_mul(u64::from(side) * u64::from(side));
-        let weighed = |s: &Shape, area: f64| area * s.weight.element_product();
-        let area: f64 = shapes.iter().map(|s| weighed(s, s.area)).sum();
-        let bounds: f64 = shapes.iter().map(|s| weighed(s, s.extent.element_product())).sum();
+    pub(super) fn worthwhile(shapes: &[Shape], page: Page) -> Option<Self> {
+        let texels = u64::from(page.width) * u64::from(page.height);
+        let work = (shapes.len() as u64).saturating_mul(texels);
+        let area: f64 = shapes.iter().map(Shape::weighed_area).sum();
+        let bounds: f64 = shapes.iter().map(|s| (s.extent * s.weight).element_product()).sum();
         (area < (1.0 - LEAST_WASTE) * bounds && work <= MOST_WORK).then_some(Self(()))
     }
 }
@@ -80,6 +80,9 @@ impl Packer for Nesting {
         if charts.is_empty() {
             return Some(Vec::new()); // xatlas's own empty lists are null
         }
+        if page.width != page.height {
+            return None; // xatlas knows square pages only
+        }
         let outlines: Vec<_> = charts.iter().map(outline).collect();
         let input = Input::of(&outlines);
         let decl = UvMeshDecl {
@@ -94,7 +97,7 @@ impl Packer for Nesting {
         xatlas.pack_charts(&PackOptions {
             padding: page.padding,
             texels_per_unit: 1.0,
-            resolution: page.side,
+            resolution: page.width,
             bilinear: true,
             block_align: false,
             brute_force: true,
@@ -149,7 +152,7 @@ impl Image<'_> {
         let at = |turn| Place { x: corner.0, y: corner.1, turn };
         let shown = |turn| {
             let triangles = outline.placed(at(turn));
-            let spans = triangles.flat_map(|t| spans(t, 0.5, (0, i64::from(super::density::LARGEST_SIDE))));
+            let spans = triangles.flat_map(|t| spans(t, 0.5, (0, i64::from(super::pack::LARGEST_SIDE))));
             spans.map(|span| self.count(index, &span)).sum::<usize>()
         };
         let (upright, swapped) = (shown(Turn::Upright), shown(Turn::Swapped));

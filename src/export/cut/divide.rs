@@ -64,8 +64,9 @@ pub(super) fn divide(atlas: &Atlas, sheet: &Sheet, triangle: &[Corner; 3], edges
     }
     let (pieces, further) = parts(atlas, sheet, corners, &spots, &lines);
     let area: f64 = pieces.iter().map(|piece| share_of_area(piece.corners)).sum();
-    if !((area - 1.0).abs() <= AREA) {
-        // Next to no area: nobody sees how it is cut.
+    // Not of a triangle that has next to no area; there nobody sees how it is cut.
+    let kept = (area - 1.0).abs() <= AREA;
+    if !kept {
         return Division { pieces: vec![whole], boundary, further: Vec::new() };
     }
     Division { pieces, boundary, further }

@@ -8,7 +8,7 @@ use super::{Corner, Place};
 
 /// Cuts by edge, each as its share of the way from the edge's lesser place to the greater.
 #[derive(Debug, Default)]
-pub(super) struct Edges {
+pub(in super::super) struct Edges {
     /// Only looked up, never walked, so the hash's order has no say. The shares ascend.
     cuts: HashMap<[Place; 2], Vec<f64>>,
 }
@@ -65,6 +65,13 @@ impl Edges {
             cuts.insert(cuts.partition_point(|&cut| cut < share), share);
         }
         !near
+    }
+
+    /// Whether an edge of a triangle with corners at `places` is cut.
+    pub(super) fn touch(&self, places: [Place; 3]) -> bool {
+        let [a, b, c] = places;
+        let cut = |a: Place, b: Place| self.cuts.contains_key(&[a.min(b), a.max(b)]);
+        !self.cuts.is_empty() && (cut(a, b) || cut(b, c) || cut(c, a))
     }
 
     /// The number of cuts of an edge.

@@ -10,15 +10,17 @@
 mod borders;
 mod divide;
 mod edges;
+mod mesh;
 mod scene;
 
 use glam::DVec2;
 
 pub(super) use borders::Borders;
+pub(super) use edges::Edges;
+pub(super) use mesh::ChartedMesh;
 pub(super) use scene::Cuts;
 
 use self::divide::{Division, divide};
-use self::edges::Edges;
 use crate::unwrap::Atlas;
 
 /// What tells whether two corners are one: the bits of the position.
@@ -63,12 +65,11 @@ impl Piece {
 /// After so many rounds edges are cut where a triangle says so, heard by the neighbour or not.
 const MOST_ROUNDS: usize = 4;
 
-/// The pieces of each triangle of each sheet, at least one.
-pub(super) fn cut(atlas: &Atlas, sheets: &[Sheet]) -> Vec<Vec<Vec<Piece>>> {
-    let mut edges = Edges::default();
+/// The pieces of each triangle of each sheet, at least one; `edges` are cut further as need be.
+pub(super) fn cut(atlas: &Atlas, sheets: &[Sheet], edges: &mut Edges) -> Vec<Vec<Vec<Piece>>> {
     for sheet in sheets {
         for triangle in &sheet.triangles {
-            sheet.borders.meet(triangle, &mut edges);
+            sheet.borders.meet(triangle, edges);
         }
     }
     let mut divisions: Vec<Vec<Division>> =
@@ -77,9 +78,9 @@ pub(super) fn cut(atlas: &Atlas, sheets: &[Sheet]) -> Vec<Vec<Vec<Piece>>> {
         let mut settled = true;
         for (sheet, divisions) in sheets.iter().zip(&mut divisions) {
             for (triangle, division) in sheet.triangles.iter().zip(divisions) {
-                if division.outdated(triangle, &edges) {
-                    *division = divide(atlas, sheet, triangle, &edges);
-                    settled &= !division.report(triangle, sheet.borders.snap, &mut edges);
+                if division.outdated(triangle, edges) {
+                    *division = divide(atlas, sheet, triangle, edges);
+                    settled &= !division.report(triangle, sheet.borders.snap, edges);
                 }
             }
         }

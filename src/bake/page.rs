@@ -1,0 +1,145 @@
+//! From the light to a page: where texels are dense, where charts lie, and what the texels hold.
+
+use crate::density::{DensityOptions, LightSurvey};
+use crate::error::Error;
+use crate::options::{BakeOptions, DensityPolicy, Resolution};
+use crate::progress::Stage;
+use crate::raster::{Lighting, Lightmap, TexelCounts, rasterize};
+use crate::report::Recorder;
+use crate::surface::Surface;
+use crate::unwrap::{Atlas, Part, Room, UnwrapError, UnwrapOptions, unwrap, weighed_area, whole};
+
+use super::budget::{self, texels_for};
+use super::enter;
+
+/// The share of a page that charts and their padding fill.
+pub(super) const FILLED: f64 = 0.95;
+
+/// The share of a page's texels that charts cover, about, where light decides on density.
+const COVERED: f64 = 0.8;
+
+/// Where light decides on density and the charts leave room, they may still become denser by this factor:
+/// more texels than the light asks for only make the file larger.
+const SPARE: f64 = 1.25;
+
+/// No chart is longer than this many times the side of a square page, where the page may take any shape.
+const LONGEST: f64 = 1.5;
+
+/// A finished page.
+pub(super) struct Page {
+    pub(super) atlas: Atlas,
+    pub(super) lightmap: Lightmap,
+    pub(super) texels: TexelCounts,
+}
+
+/// Makes pages of one solution.
+pub(super) struct PageMaker<'a> {
+    lighting: &'a Lighting<'a>,
+    options: &'a BakeOptions,
+    /// A texel's side if all were alike, metres.
+    texel: f64,
+    /// Where the light needs texels, if it decides; it is asked once, for about the texels that are expected.
+    survey: Option<LightSurvey>,
+}
+
+impl<'a> PageMaker<'a> {
+    pub(super) fn new(lighting: &'a Lighting<'a>, options: &'a BakeOptions, texel: f64) -> Self {
+        let mut maker = Self { lighting, options, texel, survey: None };
+        if options.density == DensityPolicy::Light {
+            let density = maker.density(maker.room());
+            maker.survey = Some(LightSurvey::of(lighting, density));
+        }
+        maker
+    }
+
+    /// The page that the options ask for.
+    pub(super) fn page(&self, recorder: &mut Recorder) -> Result<Page, Error> {
+        match self.options.resolution {
+            Resolution::Bytes(bytes) => budget::within(self, bytes, recorder),
+            _ => self.page_of(self.room(), recorder),
+        }
+    }
+
+    /// A page of that size.
+    pub(super) fn page_of(&self, room: Room, recorder: &mut Recorder) -> Result<Page, Error> {
+        enter(recorder, Stage::Unwrap)?;
+        let atlas = self.lay_out(room)?;
+        self.paint(atlas, recorder)
+    }
+
+    /// The least page that there can be: every surface is one chart of one texel.
+    pub(super) fn least_page(&self, recorder: &mut Recorder) -> Result<Page, Error> {
+        enter(recorder, Stage::Unwrap)?;
+        let surfaces = self.lighting.surfaces();
+        let padding = Some(self.options.padding.unwrap_or(0));
+        let unwrapping = UnwrapOptions { padding, ..UnwrapOptions::new(Room::Texels(0.0)) };
+        let atlas = unwrap(surfaces, &whole(surfaces), &unwrapping)?;
+        self.paint(atlas, recorder)
+    }
+
+    /// What a page of this solution holds.
+    pub(super) fn options(&self) -> &BakeOptions {
+        self.options
+    }
+
+    fn paint(&self, atlas: Atlas, recorder: &mut Recorder) -> Result<Page, Error> {
+        enter(recorder, Stage::Raster)?;
+        let (lightmap, texels) = rasterize(self.lighting, &atlas);
+        Ok(Page { atlas, lightmap, texels })
+    }
+
+    /// How large the page becomes, or about how large.
+    fn room(&self) -> Room {
+        match self.options.resolution {
+            Resolution::Size(side) => Room::Square(side),
+            Resolution::TexelsPerMetre(density) => Room::Density(density),
+            Resolution::Bytes(bytes) => Room::Texels(texels_for(bytes, self.options.quantity)),
+        }
+    }
+
+    fn lay_out(&self, room: Room) -> Result<Atlas, UnwrapError> {
+        let surfaces = self.lighting.surfaces();
+        let mut unwrapping = UnwrapOptions { padding: self.options.padding, ..UnwrapOptions::new(room) };
+        let parts = match &self.survey {
+            None => whole(surfaces),
+            Some(survey) => {
+                let mut parts = survey.cut(surfaces, self.density(room));
+                let mean = normalize(surfaces, &mut parts);
+                if !matches!(room, Room::Density(_)) {
+                    unwrapping.most = Some(SPARE * mean);
+                }
+                parts
+            }
+        };
+        unwrap(surfaces, &parts, &unwrapping)
+    }
+
+    /// What deciding on density must know of the page.
+    fn density(&self, room: Room) -> DensityOptions {
+        let texels = match room {
+            Room::Square(side) => FILLED * f64::from(side).powi(2),
+            Room::Density(density) => {
+                let area: f64 = self.lighting.surfaces().iter().map(|s| s.area).sum();
+                area * density * density / COVERED
+            }
+            Room::Texels(texels) => texels,
+        };
+        let longest = match room {
+            Room::Square(side) => f64::from(side) - 1.0,
+            _ => LONGEST * texels.sqrt(),
+        };
+        let padding = self.options.padding.unwrap_or(1);
+        DensityOptions { texels, longest, padding, uniform_texel: self.texel }
+    }
+}
+
+/// Makes the parts' weights relative to their mean by area, so that a density means the same as for parts that
+/// are all alike; returns the mean, texels a metre.
+fn normalize(surfaces: &[Surface], parts: &mut [Part]) -> f64 {
+    let area: f64 = surfaces.iter().map(|s| s.area).sum();
+    let texels: f64 = parts.iter().map(|part| weighed_area(part, &surfaces[part.surface])).sum();
+    let mean = (texels / area).sqrt();
+    let mean = if mean.is_finite() && mean > 0.0 { mean } else { 1.0 };
+    parts.iter_mut().for_each(|part| part.weight /= mean);
+    mean
+}
