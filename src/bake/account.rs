@@ -108,6 +108,7 @@ pub(super) fn fill_texels(report: &mut Report, atlas: &Atlas, texels: TexelCount
     report.texels.evaluated = texels.evaluated;
     report.texels.dilated = texels.dilated;
     report.texels.ways = texels.ways;
+    report.lightmap.seams = texels.seams;
     report.texels.exact = texels.effort.exact;
     report.texels.by_rays = texels.effort.by_rays;
     report.lightmap.width = atlas.width;

@@ -10,6 +10,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
+use serde::Serialize;
 
 use crate::light::luminance;
 use crate::surface::Surface;
@@ -36,7 +37,7 @@ const SAME_PLACE: f64 = 1e-6;
 
 /// How well the sides agree: root mean square of their difference over all samples that were used, and
 /// the mean light there.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SeamReport {
     /// Points at which both sides were compared.
     pub samples: u64,
@@ -237,6 +238,9 @@ fn common_edge(a: &[DVec2], b: &[DVec2]) -> Option<[DVec2; 2]> {
     None
 }
 
+/// An edge of a surface with this index, plane coordinates.
+type SurfaceEdge = (usize, [DVec2; 2]);
+
 /// Edges that two surfaces in one plane share whole, where neither is cut.
 fn between_surfaces<'a>(surfaces: &[Surface], atlas: &'a Atlas) -> Vec<Seam<'a>> {
     let corners = surfaces.iter().flat_map(|s| s.rings.iter().flatten().map(|&p| s.frame.lift(p)));
@@ -245,7 +249,7 @@ fn between_surfaces<'a>(surfaces: &[Surface], atlas: &'a Atlas) -> Vec<Seam<'a>>
         return Vec::new();
     }
     let key = |p: DVec3| (p / (SAME_PLACE * size)).round().to_array().map(|c| c as i64);
-    let mut edges: BTreeMap<[[i64; 3]; 2], Vec<(usize, [DVec2; 2])>> = BTreeMap::new();
+    let mut edges: BTreeMap<[[i64; 3]; 2], Vec<SurfaceEdge>> = BTreeMap::new();
     for (index, surface) in surfaces.iter().enumerate().filter(|(s, _)| atlas.charts_of(*s).len() == 1) {
         for ring in &surface.rings {
             for (&p, &q) in ring.iter().zip(ring.iter().cycle().skip(1)) {

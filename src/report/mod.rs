@@ -16,7 +16,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::options::BakeOptions;
-use crate::raster::TexelWays;
+use crate::raster::{SeamReport, TexelWays};
 
 /// Everything that a bake reports.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -140,6 +140,8 @@ pub struct LightmapReport {
     pub bytes: u64,
     /// Size of the PNG that `MOZ_lightmap` names, 0 where there is none.
     pub png_bytes: u64,
+    /// How well charts agree where they meet.
+    pub seams: SeamReport,
 }
 
 /// The energy ledger: `emitted = absorbed + escaped + unshot`, per channel.
@@ -225,7 +227,8 @@ mod tests {
         assert_eq!(keys(&json["texels"]), texels);
         let ways = ["behind", "lit", "umbra", "smooth", "crossed", "edge"];
         assert_eq!(keys(&json["texels"]["ways"]), ways);
-        let lightmap = ["width", "height", "texels_per_metre", "charts", "utilisation", "bytes", "png_bytes"];
+        let lightmap =
+            ["width", "height", "texels_per_metre", "charts", "utilisation", "bytes", "png_bytes", "seams"];
         assert_eq!(keys(&json["lightmap"]), lightmap);
         assert_eq!(keys(&json["energy"]), ["emitted", "absorbed", "escaped", "unshot"]);
     }
