@@ -24,6 +24,7 @@ use written::Written;
 
 mod account;
 mod budget;
+mod cells;
 mod page;
 mod scale;
 mod written;
@@ -154,7 +155,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     let mut report = Report { options: options.clone(), ..Report::default() };
     report.elements.initial = initial;
     account::fill_report(&mut report, scene, &surfaces, &solution);
-    account::fill_texels(&mut report, &atlas, texels);
+    account::fill_texels(&mut report, (&surfaces, &atlas), texels);
     let written = Written::in_document(&glb);
     (report.lightmap.bytes, report.lightmap.png_bytes) = (written.exr, written.png);
     recorder.finish(&mut report);

@@ -149,6 +149,10 @@ pub struct BakeOptions {
     /// Free texels around the texels that bilinear lookups inside a chart touch, `[1, 16]`; twice as
     /// many lie between two charts. Default: 1, or 0 where the charts do not fit otherwise.
     pub padding: Option<u32>,
+    /// Mip levels, `[0, 4]`, that show each chart without its neighbours' light: charts lie in cells of whole texels
+    /// of the coarsest level, and gutters are as wide as one of these. Costs room, the more the smaller
+    /// the charts are. Default: 0, for bilinear lookups in the lightmap itself.
+    pub mips: u32,
     /// Which of the document's scenes to bake. Default: its default scene.
     pub scene: Option<usize>,
 }
@@ -183,6 +187,7 @@ impl Default for BakeOptions {
             gather_error: None,
             max_reflectance: 0.95,
             padding: None,
+            mips: 0,
             scene: None,
         }
     }
@@ -236,6 +241,8 @@ impl BakeOptions {
         if let Some(p) = self.padding {
             check((1..=16).contains(&p), "padding", f64::from(p), "between 1 and 16 texels")?;
         }
+        let most = crate::unwrap::MOST_MIPS;
+        check(self.mips <= most, "mips", f64::from(self.mips), "between 0 and 4 levels")?;
         let m = self.illumination_threshold;
         check(m > 0.0 && m <= 1.0, "illumination-threshold", m, "above 0 and at most 1")?;
         let u = self.unshot_fraction;

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 23] = [
+const OPTIONS: [&str; 25] = [
     "--output",
     "--budget",
     "--size",
@@ -34,6 +34,8 @@ const OPTIONS: [&str; 23] = [
     "--unshot-fraction",
     "--gather-error",
     "--padding",
+    "--mips",
+    "--density",
     "--scene",
     "--quiet",
 ];

@@ -7,9 +7,12 @@ use crate::progress::Stage;
 use crate::raster::{Lighting, Lightmap, TexelCounts, rasterize};
 use crate::report::Recorder;
 use crate::surface::Surface;
-use crate::unwrap::{Atlas, Part, Room, UnwrapError, UnwrapOptions, unwrap, weighed_area, whole};
+use crate::unwrap::{
+    Atlas, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_padding, unwrap, whole,
+};
 
 use super::budget::{self, texels_for};
+use super::cells::fill_cells;
 use super::enter;
 
 /// The share of a page that charts and their padding fill.
@@ -72,7 +75,7 @@ impl<'a> PageMaker<'a> {
         enter(recorder, Stage::Unwrap)?;
         let surfaces = self.lighting.surfaces();
         let padding = Some(self.options.padding.unwrap_or(0));
-        let unwrapping = UnwrapOptions { padding, ..UnwrapOptions::new(Room::Texels(0.0)) };
+        let unwrapping = UnwrapOptions { padding, ..self.unwrapping(Room::Texels(0.0)) };
         let atlas = unwrap(surfaces, &whole(surfaces), &unwrapping)?;
         self.paint(atlas, recorder)
     }
@@ -84,7 +87,11 @@ impl<'a> PageMaker<'a> {
 
     fn paint(&self, atlas: Atlas, recorder: &mut Recorder) -> Result<Page, Error> {
         enter(recorder, Stage::Raster)?;
-        let (lightmap, texels) = rasterize(self.lighting, &atlas);
+        let (mut lightmap, mut texels) = rasterize(self.lighting, &atlas);
+        if self.options.mips > 0 {
+            let filled = fill_cells(&mut lightmap, self.lighting.surfaces(), &atlas, self.options.mips);
+            texels.dilated = filled;
+        }
         Ok(Page { atlas, lightmap, texels })
     }
 
@@ -97,9 +104,14 @@ impl<'a> PageMaker<'a> {
         }
     }
 
+    fn unwrapping(&self, room: Room) -> UnwrapOptions {
+        let &BakeOptions { padding, mips, .. } = self.options;
+        UnwrapOptions { padding, mips, ..UnwrapOptions::new(room) }
+    }
+
     fn lay_out(&self, room: Room) -> Result<Atlas, UnwrapError> {
         let surfaces = self.lighting.surfaces();
-        let mut unwrapping = UnwrapOptions { padding: self.options.padding, ..UnwrapOptions::new(room) };
+        let mut unwrapping = self.unwrapping(room);
         let parts = match &self.survey {
             None => whole(surfaces),
             Some(survey) => {
@@ -128,7 +140,7 @@ impl<'a> PageMaker<'a> {
             Room::Square(side) => f64::from(side) - 1.0,
             _ => LONGEST * texels.sqrt(),
         };
-        let padding = self.options.padding.unwrap_or(1);
+        let padding = mean_padding(self.options.padding, self.options.mips);
         DensityOptions { texels, longest, padding, uniform_texel: self.texel }
     }
 }
@@ -137,7 +149,9 @@ impl<'a> PageMaker<'a> {
 /// are all alike; returns the mean, texels a metre.
 fn normalize(surfaces: &[Surface], parts: &mut [Part]) -> f64 {
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
-    let texels: f64 = parts.iter().map(|part| weighed_area(part, &surfaces[part.surface])).sum();
+    let of =
+        |part: &Part| area_within(&surfaces[part.surface], &part.outline) * part.weight.element_product();
+    let texels: f64 = parts.iter().map(of).sum();
     let mean = (texels / area).sqrt();
     let mean = if mean.is_finite() && mean > 0.0 { mean } else { 1.0 };
     parts.iter_mut().for_each(|part| part.weight /= mean);
