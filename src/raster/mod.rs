@@ -17,7 +17,7 @@ mod ways;
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::element::SurfaceAppearance;
@@ -198,6 +198,15 @@ pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> (Lightmap, TexelCounts) 
         }
     }
     counts.seams = seams::join(input.surfaces, atlas, &mut texels, &valid);
+    let finished = sites.par_iter().map(|site| {
+        let at = site.y as usize * size.0 as usize + site.x as usize;
+        let irradiance = DVec3::from_array(texels[at].map(f64::from));
+        let chart = &atlas.charts[site.chart as usize];
+        (at, quantity(input, chart, site.point, irradiance).as_vec3().to_array())
+    });
+    for (at, value) in finished.collect::<Vec<_>>() {
+        texels[at] = value;
+    }
     tracing::debug!(?counts, "texels");
     let before = valid.iter().filter(|&&v| v).count();
     dilate(&mut texels, &mut valid, size, atlas.padding);
@@ -240,7 +249,7 @@ fn buried_regions(input: &RasterInput) -> Vec<Vec<bool>> {
         .collect()
 }
 
-/// The finished values of one chart's texels, in `direct`.
+/// The irradiance of one chart's texels, in `direct`.
 fn chart_texels(
     lighting: &Lighting,
     chart: &Chart,
@@ -258,18 +267,23 @@ fn chart_texels(
     }
     lighting.add_indirect(surface, &mut texels);
     take_after_neighbours(&mut texels, |t| &mut t.indirect);
-    let half = 0.5 * (step[0].abs() + step[1].abs());
     for texel in &mut texels {
-        let irradiance = texel.direct + texel.indirect;
-        texel.direct = match input.options.quantity {
-            Quantity::Irradiance => irradiance,
-            Quantity::Radiance => irradiance / PI,
-            Quantity::Radiosity => {
-                let (min, max) = (texel.point - half, texel.point + half);
-                input.appearance.exitance(surface, min, max)
-                    + input.appearance.reflectance(surface, min, max) * irradiance
-            }
-        };
+        texel.direct += texel.indirect;
     }
     (texels, ways, effort)
+}
+
+/// What a texel holds that shows a place of a surface with this irradiance.
+fn quantity(input: &RasterInput, chart: &Chart, point: DVec2, irradiance: DVec3) -> DVec3 {
+    match input.options.quantity {
+        Quantity::Irradiance => irradiance,
+        Quantity::Radiance => irradiance / PI,
+        Quantity::Radiosity => {
+            let step = texel_steps(chart);
+            let half = 0.5 * (step[0].abs() + step[1].abs());
+            let (min, max) = (point - half, point + half);
+            input.appearance.exitance(chart.surface, min, max)
+                + input.appearance.reflectance(chart.surface, min, max) * irradiance
+        }
+    }
 }

@@ -20,10 +20,12 @@ impl Layout {
     pub(super) fn atlas(&self, shapes: &[Shape], page: Page) -> Option<Atlas> {
         let sized = sized(shapes, self.texels_per_metre)?;
         let page = page.cropped(&sized, &self.places);
+        let sum = |of: fn(&Shape) -> f64| shapes.iter().map(of).sum::<f64>();
+        let mean_weight = (sum(Shape::weighed_area) / sum(|s| s.area)).sqrt();
         Some(Atlas {
             width: page.width,
             height: page.height,
-            texels_per_metre: self.texels_per_metre,
+            texels_per_metre: self.texels_per_metre * if mean_weight.is_finite() { mean_weight } else { 1.0 },
             padding: page.gutter.padding,
             charts: sized.iter().zip(&self.places).map(|(chart, &place)| chart.chart(place)).collect(),
         })

@@ -15,6 +15,7 @@ mod rectangles;
 mod blocker;
 mod contact;
 mod degenerate;
+mod density;
 mod emitter;
 mod growth;
 mod nothing;

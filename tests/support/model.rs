@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses a part")]
 #![allow(clippy::expect_used, reason = "clippy lets tests expect things, but not what they share")]
 
-use cobake::options::{BakeOptions, Resolution};
+use cobake::options::{BakeOptions, DensityPolicy, Resolution};
 use cobake::progress::Silent;
 use cobake::scene::{ImportError, ImportOptions, Scene, from_bytes};
 use cobake::{BakeResult, bake_scene};
@@ -142,10 +142,18 @@ impl Model {
     }
 }
 
-/// Options for a page of `side` texels.
+/// Options for a page of `side` texels, all of a size, so that distances can be told in texels.
 pub(crate) fn sized(side: u32) -> BakeOptions {
     let mut options = BakeOptions::default();
     options.resolution = Resolution::Size(side);
+    options.density = DensityPolicy::Uniform;
+    options
+}
+
+/// The same with texels where the light needs them.
+pub(crate) fn by_light(side: u32) -> BakeOptions {
+    let mut options = sized(side);
+    options.density = DensityPolicy::Light;
     options
 }
 
