@@ -27,6 +27,7 @@ mod budget;
 mod cells;
 mod page;
 mod scale;
+mod weights;
 mod written;
 
 /// Samples keep this fraction of the scene's diagonal from outlines.
@@ -95,6 +96,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     account::warn_of_surfaces(&set, &mut recorder);
     account::warn_of_reflectance(scene, options, &mut recorder);
     let surfaces = set.surfaces;
+    let weights = weights::of_surfaces(scene, &surfaces, options)?;
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
     let scale = Scale::of(&surfaces, options);
     let mesh_options = MeshOptions {
@@ -141,7 +143,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     };
     let lighting = Lighting::new(&raster_input);
     let Page { atlas, lightmap, texels } =
-        PageMaker::new(&lighting, options, scale.texel).page(&mut recorder)?;
+        PageMaker::new(&lighting, options, scale.texel, weights).page(&mut recorder)?;
 
     enter(&mut recorder, Stage::Export)?;
     let glb = encode(&Baked {

@@ -1,5 +1,7 @@
 //! What a bake can be told. The command line uses the same words.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 /// Which elements are split when a shooter's light arrives.
@@ -116,6 +118,9 @@ pub struct BakeOptions {
     pub resolution: Resolution,
     /// Where texels are dense. Default: [`DensityPolicy::Light`].
     pub density: DensityPolicy,
+    /// By the index of a glTF node: how many times as many texels a metre as else lie on what the node's mesh shows,
+    /// `[1/64, 64]`. Where the page's or the file's size is given others get less, or more. Default: none, all 1.
+    pub node_density: BTreeMap<usize, f64>,
     /// Worker threads, `[0, 1024]`; `0` takes one per core. The result does not depend on it. Default: `0`.
     pub threads: usize,
     /// Which elements are split. Default: [`Refine::CobGradient`].
@@ -173,6 +178,7 @@ impl Default for BakeOptions {
         Self {
             resolution: Resolution::default(),
             density: DensityPolicy::default(),
+            node_density: BTreeMap::new(),
             threads: 0,
             refine: Refine::default(),
             direct: Direct::default(),
@@ -197,7 +203,7 @@ impl Default for BakeOptions {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{option} is {value}; it must be {range}")]
 pub struct OptionsError {
-    /// The option's name as on the command line, without dashes.
+    /// The option's name as on the command line, without dashes; `node-density` is the library's alone.
     pub option: &'static str,
     /// The value given.
     pub value: f64,
@@ -225,6 +231,10 @@ impl BakeOptions {
                 let range = "at least 1 byte and less than 4 GiB, as a glTF's buffer is";
                 check((1..1 << 32).contains(&b), "budget", b as f64, range)?;
             }
+        }
+        for &factor in self.node_density.values() {
+            let range = "between 1/64 and 64 for every node";
+            check((1.0 / 64.0..=64.0).contains(&factor), "node-density", factor, range)?;
         }
         check(self.threads <= 1024, "threads", self.threads as f64, "at most 1024 (0 takes one per core)")?;
         match self.cob_height {

@@ -43,11 +43,18 @@ pub(super) struct PageMaker<'a> {
     texel: f64,
     /// Where the light needs texels, if it decides; it is asked once, for about the texels that are expected.
     survey: Option<LightSurvey>,
+    /// How many times as dense as else texels lie on each surface.
+    weights: Vec<f64>,
 }
 
 impl<'a> PageMaker<'a> {
-    pub(super) fn new(lighting: &'a Lighting<'a>, options: &'a BakeOptions, texel: f64) -> Self {
-        let mut maker = Self { lighting, options, texel, survey: None };
+    pub(super) fn new(
+        lighting: &'a Lighting<'a>,
+        options: &'a BakeOptions,
+        texel: f64,
+        weights: Vec<f64>,
+    ) -> Self {
+        let mut maker = Self { lighting, options, texel, survey: None, weights };
         if options.density == DensityPolicy::Light {
             let density = maker.density(maker.room());
             maker.survey = Some(LightSurvey::of(lighting, density));
@@ -113,9 +120,13 @@ impl<'a> PageMaker<'a> {
         let surfaces = self.lighting.surfaces();
         let mut unwrapping = self.unwrapping(room);
         let parts = match &self.survey {
-            None => whole(surfaces),
+            None => {
+                let mut parts = whole(surfaces);
+                parts.iter_mut().for_each(|part| part.weight *= self.weights[part.surface]);
+                parts
+            }
             Some(survey) => {
-                let mut parts = survey.cut(surfaces, self.density(room));
+                let mut parts = survey.cut(surfaces, &self.weights, self.density(room));
                 let mean = normalize(surfaces, &mut parts);
                 if !matches!(room, Room::Density(_)) {
                     unwrapping.most = Some(SPARE * mean);
