@@ -24,8 +24,10 @@ use written::Written;
 
 mod account;
 mod budget;
+mod cells;
 mod page;
 mod scale;
+mod weights;
 mod written;
 
 /// Samples keep this fraction of the scene's diagonal from outlines.
@@ -94,6 +96,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     account::warn_of_surfaces(&set, &mut recorder);
     account::warn_of_reflectance(scene, options, &mut recorder);
     let surfaces = set.surfaces;
+    let weights = weights::of_surfaces(scene, &surfaces, options)?;
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
     let scale = Scale::of(&surfaces, options);
     let mesh_options = MeshOptions {
@@ -140,7 +143,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     };
     let lighting = Lighting::new(&raster_input);
     let Page { atlas, lightmap, texels } =
-        PageMaker::new(&lighting, options, scale.texel).page(&mut recorder)?;
+        PageMaker::new(&lighting, options, scale.texel, weights).page(&mut recorder)?;
 
     enter(&mut recorder, Stage::Export)?;
     let glb = encode(&Baked {
@@ -154,7 +157,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     let mut report = Report { options: options.clone(), ..Report::default() };
     report.elements.initial = initial;
     account::fill_report(&mut report, scene, &surfaces, &solution);
-    account::fill_texels(&mut report, &atlas, texels);
+    account::fill_texels(&mut report, (&surfaces, &atlas), texels);
     let written = Written::in_document(&glb);
     (report.lightmap.bytes, report.lightmap.png_bytes) = (written.exr, written.png);
     recorder.finish(&mut report);

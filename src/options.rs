@@ -1,5 +1,7 @@
 //! What a bake can be told. The command line uses the same words.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 /// Which elements are split when a shooter's light arrives.
@@ -116,6 +118,9 @@ pub struct BakeOptions {
     pub resolution: Resolution,
     /// Where texels are dense. Default: [`DensityPolicy::Light`].
     pub density: DensityPolicy,
+    /// By the index of a glTF node: how many times as many texels a metre as else lie on what the node's mesh shows,
+    /// `[1/64, 64]`. Where the page's or the file's size is given others get less, or more. Default: none, all 1.
+    pub node_density: BTreeMap<usize, f64>,
     /// Worker threads, `[0, 1024]`; `0` takes one per core. The result does not depend on it. Default: `0`.
     pub threads: usize,
     /// Which elements are split. Default: [`Refine::CobGradient`].
@@ -149,6 +154,10 @@ pub struct BakeOptions {
     /// Free texels around the texels that bilinear lookups inside a chart touch, `[1, 16]`; twice as
     /// many lie between two charts. Default: 1, or 0 where the charts do not fit otherwise.
     pub padding: Option<u32>,
+    /// Mip levels, `[0, 4]`, that show each chart without its neighbours' light: charts lie in cells of whole texels
+    /// of the coarsest level, and gutters are as wide as one of these. Costs room, the more the smaller
+    /// the charts are. Default: 0, for bilinear lookups in the lightmap itself.
+    pub mips: u32,
     /// Which of the document's scenes to bake. Default: its default scene.
     pub scene: Option<usize>,
 }
@@ -169,6 +178,7 @@ impl Default for BakeOptions {
         Self {
             resolution: Resolution::default(),
             density: DensityPolicy::default(),
+            node_density: BTreeMap::new(),
             threads: 0,
             refine: Refine::default(),
             direct: Direct::default(),
@@ -183,6 +193,7 @@ impl Default for BakeOptions {
             gather_error: None,
             max_reflectance: 0.95,
             padding: None,
+            mips: 0,
             scene: None,
         }
     }
@@ -192,7 +203,7 @@ impl Default for BakeOptions {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{option} is {value}; it must be {range}")]
 pub struct OptionsError {
-    /// The option's name as on the command line, without dashes.
+    /// The option's name as on the command line, without dashes; `node-density` is the library's alone.
     pub option: &'static str,
     /// The value given.
     pub value: f64,
@@ -221,6 +232,10 @@ impl BakeOptions {
                 check((1..1 << 32).contains(&b), "budget", b as f64, range)?;
             }
         }
+        for &factor in self.node_density.values() {
+            let range = "between 1/64 and 64 for every node";
+            check((1.0 / 64.0..=64.0).contains(&factor), "node-density", factor, range)?;
+        }
         check(self.threads <= 1024, "threads", self.threads as f64, "at most 1024 (0 takes one per core)")?;
         match self.cob_height {
             CobHeight::OfElement(h) => {
@@ -236,6 +251,8 @@ impl BakeOptions {
         if let Some(p) = self.padding {
             check((1..=16).contains(&p), "padding", f64::from(p), "between 1 and 16 texels")?;
         }
+        let most = crate::unwrap::MOST_MIPS;
+        check(self.mips <= most, "mips", f64::from(self.mips), "between 0 and 4 levels")?;
         let m = self.illumination_threshold;
         check(m > 0.0 && m <= 1.0, "illumination-threshold", m, "above 0 and at most 1")?;
         let u = self.unshot_fraction;

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 24] = [
+const OPTIONS: [&str; 25] = [
     "--output",
     "--budget",
     "--size",
@@ -35,6 +35,7 @@ const OPTIONS: [&str; 24] = [
     "--gather-error",
     "--density",
     "--padding",
+    "--mips",
     "--scene",
     "--quiet",
 ];

@@ -7,11 +7,11 @@ use crate::element::Facet;
 use crate::options::BakeOptions;
 use crate::progress::Progress;
 use crate::raster::TexelCounts;
-use crate::report::Report;
+use crate::report::{DensityReport, Report};
 use crate::scene::Scene;
 use crate::solve::Solution;
 use crate::surface::{Surface, SurfaceSet};
-use crate::unwrap::Atlas;
+use crate::unwrap::{Atlas, Chart, area_within};
 
 /// Says which contacts were lost.
 pub(super) fn warn_of_surfaces(set: &SurfaceSet, progress: &mut dyn Progress) {
@@ -102,7 +102,7 @@ pub(super) fn fill_report(report: &mut Report, scene: &Scene, surfaces: &[Surfac
 }
 
 /// Fills in what became of the texels.
-pub(super) fn fill_texels(report: &mut Report, atlas: &Atlas, texels: TexelCounts) {
+pub(super) fn fill_texels(report: &mut Report, (surfaces, atlas): (&[Surface], &Atlas), texels: TexelCounts) {
     report.rays += texels.effort.rays;
     report.texels.covered = texels.covered;
     report.texels.evaluated = texels.evaluated;
@@ -117,4 +117,25 @@ pub(super) fn fill_texels(report: &mut Report, atlas: &Atlas, texels: TexelCount
     report.lightmap.charts = atlas.charts.len() as u64;
     let all = f64::from(atlas.width) * f64::from(atlas.height);
     report.lightmap.utilisation = texels.covered as f64 / all.max(1.0);
+    report.lightmap.padding = texels.dilated as f64 / all.max(1.0);
+    report.lightmap.gutter = 2 * atlas.padding;
+    report.lightmap.density = density(surfaces, atlas);
+}
+
+/// How fine the charts are that show something.
+fn density(surfaces: &[Surface], atlas: &Atlas) -> DensityReport {
+    let of = |chart: &Chart| {
+        let density = chart.texel_from_plane.matrix2.determinant().abs().sqrt();
+        (density, area_within(&surfaces[chart.surface], &chart.outline))
+    };
+    let mut charts: Vec<(f64, f64)> = atlas.charts.iter().map(of).filter(|&(_, area)| area > 0.0).collect();
+    charts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let all: f64 = charts.iter().map(|(_, area)| area).sum();
+    let mut below = 0.0;
+    let median = charts.iter().find(|(_, area)| {
+        below += area;
+        below >= 0.5 * all
+    });
+    let value = |chart: Option<&(f64, f64)>| chart.map_or(0.0, |&(density, _)| density);
+    DensityReport { least: value(charts.first()), median: value(median), greatest: value(charts.last()) }
 }

@@ -7,9 +7,12 @@ use crate::progress::Stage;
 use crate::raster::{Lighting, Lightmap, TexelCounts, rasterize};
 use crate::report::Recorder;
 use crate::surface::Surface;
-use crate::unwrap::{Atlas, Part, Room, UnwrapError, UnwrapOptions, unwrap, weighed_area, whole};
+use crate::unwrap::{
+    Atlas, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_padding, unwrap, whole,
+};
 
 use super::budget::{self, texels_for};
+use super::cells::fill_cells;
 use super::enter;
 
 /// The share of a page that charts and their padding fill.
@@ -40,11 +43,18 @@ pub(super) struct PageMaker<'a> {
     texel: f64,
     /// Where the light needs texels, if it decides; it is asked once, for about the texels that are expected.
     survey: Option<LightSurvey>,
+    /// How many times as dense as else texels lie on each surface.
+    weights: Vec<f64>,
 }
 
 impl<'a> PageMaker<'a> {
-    pub(super) fn new(lighting: &'a Lighting<'a>, options: &'a BakeOptions, texel: f64) -> Self {
-        let mut maker = Self { lighting, options, texel, survey: None };
+    pub(super) fn new(
+        lighting: &'a Lighting<'a>,
+        options: &'a BakeOptions,
+        texel: f64,
+        weights: Vec<f64>,
+    ) -> Self {
+        let mut maker = Self { lighting, options, texel, survey: None, weights };
         if options.density == DensityPolicy::Light {
             let density = maker.density(maker.room());
             maker.survey = Some(LightSurvey::of(lighting, density));
@@ -72,7 +82,7 @@ impl<'a> PageMaker<'a> {
         enter(recorder, Stage::Unwrap)?;
         let surfaces = self.lighting.surfaces();
         let padding = Some(self.options.padding.unwrap_or(0));
-        let unwrapping = UnwrapOptions { padding, ..UnwrapOptions::new(Room::Texels(0.0)) };
+        let unwrapping = UnwrapOptions { padding, ..self.unwrapping(Room::Texels(0.0)) };
         let atlas = unwrap(surfaces, &whole(surfaces), &unwrapping)?;
         self.paint(atlas, recorder)
     }
@@ -84,7 +94,11 @@ impl<'a> PageMaker<'a> {
 
     fn paint(&self, atlas: Atlas, recorder: &mut Recorder) -> Result<Page, Error> {
         enter(recorder, Stage::Raster)?;
-        let (lightmap, texels) = rasterize(self.lighting, &atlas);
+        let (mut lightmap, mut texels) = rasterize(self.lighting, &atlas);
+        if self.options.mips > 0 {
+            let filled = fill_cells(&mut lightmap, self.lighting.surfaces(), &atlas, self.options.mips);
+            texels.dilated = filled;
+        }
         Ok(Page { atlas, lightmap, texels })
     }
 
@@ -97,13 +111,22 @@ impl<'a> PageMaker<'a> {
         }
     }
 
+    fn unwrapping(&self, room: Room) -> UnwrapOptions {
+        let &BakeOptions { padding, mips, .. } = self.options;
+        UnwrapOptions { padding, mips, ..UnwrapOptions::new(room) }
+    }
+
     fn lay_out(&self, room: Room) -> Result<Atlas, UnwrapError> {
         let surfaces = self.lighting.surfaces();
-        let mut unwrapping = UnwrapOptions { padding: self.options.padding, ..UnwrapOptions::new(room) };
+        let mut unwrapping = self.unwrapping(room);
         let parts = match &self.survey {
-            None => whole(surfaces),
+            None => {
+                let mut parts = whole(surfaces);
+                parts.iter_mut().for_each(|part| part.weight *= self.weights[part.surface]);
+                parts
+            }
             Some(survey) => {
-                let mut parts = survey.cut(surfaces, self.density(room));
+                let mut parts = survey.cut(surfaces, &self.weights, self.density(room));
                 let mean = normalize(surfaces, &mut parts);
                 if !matches!(room, Room::Density(_)) {
                     unwrapping.most = Some(SPARE * mean);
@@ -128,7 +151,7 @@ impl<'a> PageMaker<'a> {
             Room::Square(side) => f64::from(side) - 1.0,
             _ => LONGEST * texels.sqrt(),
         };
-        let padding = self.options.padding.unwrap_or(1);
+        let padding = mean_padding(self.options.padding, self.options.mips);
         DensityOptions { texels, longest, padding, uniform_texel: self.texel }
     }
 }
@@ -137,7 +160,9 @@ impl<'a> PageMaker<'a> {
 /// are all alike; returns the mean, texels a metre.
 fn normalize(surfaces: &[Surface], parts: &mut [Part]) -> f64 {
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
-    let texels: f64 = parts.iter().map(|part| weighed_area(part, &surfaces[part.surface])).sum();
+    let of =
+        |part: &Part| area_within(&surfaces[part.surface], &part.outline) * part.weight.element_product();
+    let texels: f64 = parts.iter().map(of).sum();
     let mean = (texels / area).sqrt();
     let mean = if mean.is_finite() && mean > 0.0 { mean } else { 1.0 };
     parts.iter_mut().for_each(|part| part.weight /= mean);

@@ -84,6 +84,10 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "TEXELS", help_heading = LIGHTMAP)]
     padding: Option<u32>,
 
+    /// Mip levels that show each chart without its neighbours' light, 0 to 4: charts are aligned, and gutters wider
+    #[arg(long, value_name = "LEVELS", default_value_t = BakeOptions::default().mips, help_heading = LIGHTMAP)]
+    mips: u32,
+
     /// What a texel holds
     #[arg(long, value_enum, default_value_t = QuantityWord::Irradiance, help_heading = LIGHTMAP)]
     quantity: QuantityWord,
@@ -267,6 +271,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.gather_error = args.gather_error;
         options.max_reflectance = args.max_reflectance;
         options.padding = args.padding;
+        options.mips = args.mips;
         options.scene = args.scene;
         options
     }
@@ -301,7 +306,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --scene 1",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --scene 1",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -319,6 +324,7 @@ mod tests {
         meant.gather_error = Some(0.02);
         meant.max_reflectance = 0.9;
         meant.padding = Some(2);
+        meant.mips = 3;
         meant.scene = Some(1);
         assert_eq!(typed, meant);
     }

@@ -136,12 +136,29 @@ pub struct LightmapReport {
     pub charts: u64,
     /// Covered texels over all texels, `[0, 1]`.
     pub utilisation: f64,
+    /// Texels beside charts that were filled from their neighbours over all texels, `[0, 1]`.
+    pub padding: f64,
+    /// Free texels between two charts, at least.
+    pub gutter: u32,
+    /// How fine the charts are.
+    pub density: DensityReport,
     /// Size of the EXR.
     pub bytes: u64,
     /// Size of the PNG that `MOZ_lightmap` names, 0 where there is none.
     pub png_bytes: u64,
     /// How well charts agree where they meet.
     pub seams: SeamReport,
+}
+
+/// How fine charts are, texels a metre: the geometric mean of the density along either axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct DensityReport {
+    /// Of the coarsest chart.
+    pub least: f64,
+    /// Half of the surfaces' area is shown at most as finely as this.
+    pub median: f64,
+    /// Of the finest chart.
+    pub greatest: f64,
 }
 
 /// The energy ledger: `emitted = absorbed + escaped + unshot`, per channel.
@@ -227,8 +244,20 @@ mod tests {
         assert_eq!(keys(&json["texels"]), texels);
         let ways = ["behind", "lit", "umbra", "smooth", "crossed", "edge"];
         assert_eq!(keys(&json["texels"]["ways"]), ways);
-        let lightmap =
-            ["width", "height", "texels_per_metre", "charts", "utilisation", "bytes", "png_bytes", "seams"];
+        let lightmap = [
+            "width",
+            "height",
+            "texels_per_metre",
+            "charts",
+            "utilisation",
+            "padding",
+            "gutter",
+            "density",
+            "bytes",
+            "png_bytes",
+            "seams",
+        ];
+        assert_eq!(keys(&json["lightmap"]["density"]), ["least", "median", "greatest"]);
         assert_eq!(keys(&json["lightmap"]), lightmap);
         assert_eq!(keys(&json["energy"]), ["emitted", "absorbed", "escaped", "unshot"]);
     }

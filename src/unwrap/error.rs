@@ -6,7 +6,7 @@
 pub enum UnwrapError {
     /// The charts with their padding do not fit.
     #[error(
-        "{charts} charts with {padding} texels of padding do not fit into {side} × {side} texels; ask for a larger --size or a smaller --padding"
+        "{charts} charts with {padding} texels of padding do not fit into {side} × {side} texels; ask for a larger --size, a smaller --padding or fewer --mips"
     )]
     TooSmall {
         /// How many charts there are.

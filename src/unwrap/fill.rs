@@ -35,7 +35,7 @@ pub(super) fn fill(shapes: &[Shape], page: Page, most: f64) -> Option<Layout> {
     let ceiling = density_bound(shapes, page);
     let (width, height) = page.grown();
     let room = GUESSED_SHARE * f64::from(width) * f64::from(height);
-    let guess = density_of_texels(shapes, room, page.padding, ceiling.min(most));
+    let guess = density_of_texels(shapes, room, page.gutter, ceiling.min(most));
     let sparsest = MaxRects::ALL.iter().find_map(|order| attempt(order, shapes, page, 0.0))?;
     let search = Search { shapes, page, ceiling, most };
     let mut best = search.densest(&MaxRects::ALL[0], sparsest, guess, FIRST);

@@ -2,7 +2,7 @@
 
 use super::bit_grid::BitGrid;
 use super::footprint;
-use super::pack::{Packer, Page, Place, SizedShape};
+use super::pack::{Gutter, Packer, Page, Place, SizedShape};
 use super::shape::Shape;
 use super::{Atlas, pack};
 
@@ -26,7 +26,7 @@ impl Layout {
             width: page.width,
             height: page.height,
             texels_per_metre: self.texels_per_metre * if mean_weight.is_finite() { mean_weight } else { 1.0 },
-            padding: page.padding,
+            padding: page.gutter.padding,
             charts: sized.iter().zip(&self.places).map(|(chart, &place)| chart.chart(place)).collect(),
         })
     }
@@ -60,15 +60,15 @@ pub(super) fn sized(shapes: &[Shape], texels_per_metre: f64) -> Option<Vec<Sized
 
 /// Whether every footprint lies in the page, and none meets another when each is grown by the padding.
 pub(super) fn keeps_apart(charts: &[SizedShape<'_>], places: &[Place], page: Page) -> bool {
-    let padding = i64::from(page.padding);
-    let grown = |texels: u32| texels as usize + 2 * page.padding as usize;
+    let Gutter { padding, .. } = page.gutter;
+    let grown = |texels: u32| texels as usize + 2 * padding as usize;
     let mut taken = BitGrid::new(grown(page.width), grown(page.height));
     charts.iter().zip(places).all(|(sized, &place)| {
-        let local = sized.chart(Place { x: page.padding, y: page.padding, ..place });
+        let local = sized.chart(Place { x: padding, y: padding, ..place });
         let (width, height) = sized.turned(place.turn);
         let inside = place.x + width < page.width && place.y + height < page.height;
         let mut own = BitGrid::new(grown(width + 1), grown(height + 1));
-        let bound = grown(height + 1) as i64;
+        let (bound, padding) = (grown(height + 1) as i64, i64::from(padding));
         for triangle in &sized.shape.triangles {
             for span in footprint::spans(triangle.map(|p| local.texel(p)), 1.0, (0, bound)) {
                 for y in span.y - padding..=span.y + padding {
@@ -82,8 +82,8 @@ pub(super) fn keeps_apart(charts: &[SizedShape<'_>], places: &[Place], page: Pag
 
 /// The density at which all charts take about `texels` with their padding, none above `most`;
 /// 0 where charts of one texel take more.
-pub(super) fn density_of_texels(shapes: &[Shape], texels: f64, padding: u32, most: f64) -> f64 {
-    let page = Page { width: pack::LARGEST_SIDE, height: pack::LARGEST_SIDE, padding };
+pub(super) fn density_of_texels(shapes: &[Shape], texels: f64, gutter: Gutter, most: f64) -> f64 {
+    let page = Page { width: pack::LARGEST_SIDE, height: pack::LARGEST_SIDE, gutter };
     let fits = |density: f64| {
         let texels_of = |s: &Shape| SizedShape::new(s, density).map_or(f64::INFINITY, |c| page.cell_area(&c));
         shapes.iter().map(texels_of).sum::<f64>() <= texels

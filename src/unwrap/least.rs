@@ -1,7 +1,8 @@
 //! Finds the least page that charts of a given density need.
 //!
-//! Rectangles are packed into strips of several widths, as high as it takes, in several orders; the page
-//! of the least area wins. It need not be square, nor its sides powers of two.
+//! Rectangles are packed into strips of several widths, as high as it takes, in several orders. The page
+//! that will take the fewest bytes wins, about: it need not be square, nor its sides powers of two, and a
+//! wide one is compressed better than a high one.
 
 use rayon::prelude::*;
 
@@ -9,14 +10,22 @@ use rayon::prelude::*;
 use super::layout::packed;
 use super::layout::{Layout, keeps_apart, sized};
 use super::max_rects::MaxRects;
-use super::pack::{LARGEST_SIDE, Packer, Page, Place, STEP, SizedShape};
+#[cfg(feature = "xatlas")]
+use super::pack::STEP;
+use super::pack::{Gutter, LARGEST_SIDE, Packer, Page, Place, SizedShape};
 use super::shape::Shape;
 
-/// Strips that are tried.
-const WIDTHS: i32 = 9;
+/// How many times as wide as a square the strips are that are tried.
+const WIDTHS: [f64; 9] = [0.8, 0.9, 1.0, 1.2, 1.5, 2.0, 2.5, 3.2, 4.0];
 
-/// The widest is this many times as wide as a square would be, the narrowest this many times narrower.
-const WIDEST: f64 = 1.5;
+/// Strips more than this many times as wide as a square are not tried if they are wider than this, texels: small
+/// pages gain most, and not every graphics card takes more than a few thousand.
+const WIDE: (f64, f64) = (2.0, 1024.0);
+
+/// An EXR is compressed in bands of this many rows,
+const BAND: u32 = 32;
+/// each of which has tables that take as much as this many texels.
+const BAND_TABLES: u64 = 900;
 
 /// Packs that xatlas gets.
 #[cfg(feature = "xatlas")]
@@ -27,12 +36,12 @@ const XATLAS_PACKS: u32 = 6;
 pub(super) fn least_page(
     shapes: &[Shape],
     texels_per_metre: f64,
-    padding: u32,
+    gutter: Gutter,
     longest: u32,
 ) -> Option<(Page, Layout)> {
     let charts = sized(shapes, texels_per_metre)?;
     let longest = longest.min(LARGEST_SIDE);
-    let mut found: Vec<(Page, Vec<Place>)> = strips(&charts, padding, longest)
+    let mut found: Vec<(Page, Vec<Place>)> = strips(&charts, gutter, longest)
         .into_par_iter()
         .flat_map_iter(|strip| MaxRects::ALL.map(|order| (strip, order)))
         .filter_map(|(strip, order)| {
@@ -41,7 +50,7 @@ pub(super) fn least_page(
         })
         .collect();
     // The sort is stable, so the first of equals wins whoever found it first.
-    found.sort_by_key(|(page, _)| (area(*page), page.width.max(page.height)));
+    found.sort_by_key(|(page, _)| cost(*page));
     let best = found.into_iter().find(|(page, places)| keeps_apart(&charts, places, *page));
     let best = best.map(|(page, places)| (page, Layout { texels_per_metre, places }))?;
     #[cfg(feature = "xatlas")]
@@ -49,21 +58,22 @@ pub(super) fn least_page(
     Some(best)
 }
 
-fn area(page: Page) -> u64 {
-    u64::from(page.width) * u64::from(page.height)
+/// What a page takes in the file, in texels.
+fn cost(page: Page) -> u64 {
+    u64::from(page.width) * u64::from(page.height) + BAND_TABLES * u64::from(page.height.div_ceil(BAND))
 }
 
 /// The pages to pack into, without repetitions.
-fn strips(charts: &[SizedShape<'_>], padding: u32, longest: u32) -> Vec<Page> {
-    let page = Page { width: longest, height: longest, padding };
+fn strips(charts: &[SizedShape<'_>], gutter: Gutter, longest: u32) -> Vec<Page> {
+    let page = Page { width: longest, height: longest, gutter };
     let square = charts.iter().map(|c| page.cell_area(c)).sum::<f64>().sqrt();
-    let footprint = |side: u32| side + 1;
+    let footprint = |side: u32| gutter.cell(side) - 2 * gutter.overhang();
     let thickest = charts.iter().map(|c| footprint(c.width.min(c.height))).max().unwrap_or(1);
     let longest_chart = charts.iter().map(|c| footprint(c.width.max(c.height))).max().unwrap_or(1);
-    let half = WIDTHS / 2;
-    let factors = (-half..=half).map(|k| WIDEST.powf(f64::from(k) / f64::from(half)));
+    let is_tried = |factor: &f64| *factor <= WIDE.0 || factor * square <= WIDE.1;
+    let factors = WIDTHS.into_iter().filter(is_tried);
     let widths = factors.map(|f| (f * square) as u32).chain([longest_chart]);
-    let in_steps = |width: u32| width.max(thickest).next_multiple_of(STEP).min(longest);
+    let in_steps = |width: u32| width.max(thickest).next_multiple_of(gutter.step()).min(longest);
     let mut widths: Vec<u32> = widths.map(in_steps).collect();
     widths.sort_unstable();
     widths.dedup();
@@ -73,9 +83,9 @@ fn strips(charts: &[SizedShape<'_>], padding: u32, longest: u32) -> Vec<Page> {
 /// A smaller square page in which the charts nest, if xatlas finds one.
 #[cfg(feature = "xatlas")]
 fn nested(shapes: &[Shape], best: (Page, Layout)) -> (Page, Layout) {
-    let (Page { padding, .. }, density) = (best.0, best.1.texels_per_metre);
-    let square = |steps: u32| Page { width: steps * STEP, height: steps * STEP, padding };
-    let side = (area(best.0) as f64).sqrt();
+    let (Page { gutter, .. }, density) = (best.0, best.1.texels_per_metre);
+    let square = |steps: u32| Page { width: steps * STEP, height: steps * STEP, gutter };
+    let side = (f64::from(best.0.width) * f64::from(best.0.height)).sqrt();
     let Some(packer) = super::xatlas::Nesting::worthwhile(shapes, square((side / f64::from(STEP)) as u32))
     else {
         return best;

@@ -75,8 +75,7 @@ impl Packer for MaxRects {
             let ((_, taken), turn) =
                 upright.into_iter().chain(swapped).min_by_key(|&((score, _), _)| score)?;
             take(&mut free, taken);
-            // The footprint begins `padding` inside the rectangle, the page `padding` inside the grown page.
-            *places.get_mut(index)? = Place { x: taken.x, y: taken.y, turn };
+            *places.get_mut(index)? = page.place((taken.x, taken.y), turn);
         }
         Some(places)
     }

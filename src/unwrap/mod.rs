@@ -27,7 +27,7 @@ mod xatlas;
 
 pub use error::UnwrapError;
 pub use part::{Part, whole};
-pub(crate) use part::{clip, weighed_area};
+pub(crate) use part::{area_within, clip};
 
 use glam::{DAffine2, DVec2};
 
@@ -36,7 +36,7 @@ use crate::surface::Surface;
 use fill::fill;
 use layout::density_of_texels;
 use least::least_page;
-use pack::{LARGEST_SIDE, Page};
+use pack::{Gutter, LARGEST_SIDE, Page};
 use shape::Shape;
 
 /// Where each surface lies in the lightmap.
@@ -122,20 +122,27 @@ pub struct UnwrapOptions {
     /// charts, enough for bilinear filtering with a graphics card's fixed-point weights; 0 where
     /// the charts do not fit otherwise.
     pub padding: Option<u32>,
+    /// Mip levels, at most [`MOST_MIPS`], in which bilinear lookups inside a chart touch no other chart's texels:
+    /// each chart's cell begins and ends at multiples of `2^mips`, with at least half as much padding
+    /// inside. Costs room. Default: 0, for lookups in the page itself only.
+    pub mips: u32,
 }
+
+/// The most mip levels that [`UnwrapOptions::mips`] asks for: cells of 16 texels.
+pub const MOST_MIPS: u32 = 4;
 
 impl UnwrapOptions {
     /// The defaults in a page of this size.
     #[must_use]
     pub fn new(room: Room) -> Self {
-        Self { room, most: None, padding: None }
+        Self { room, most: None, padding: None, mips: 0 }
     }
 }
 
 /// Lays a chart for each of the surfaces' `parts` (ordered by surface) out in one page.
 ///
 /// A part's own weight multiplies the density. Sides of the page are multiples of 4, but for one that
-/// [`Room::Square`] gives. The same input gives the same atlas.
+/// [`Room::Square`] gives, and of the cells that mip levels ask for in any case. The same input gives the same atlas.
 ///
 /// # Errors
 ///
@@ -143,24 +150,34 @@ impl UnwrapOptions {
 /// [`UnwrapError::TooLarge`] if the density asked for needs a page above 16384 texels.
 pub fn unwrap(surfaces: &[Surface], parts: &[Part], options: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
     let shapes: Vec<_> = parts.iter().map(|part| Shape::of(part, &surfaces[part.surface])).collect();
-    let padding = options.padding.unwrap_or(1);
-    let atlas = lay_out(&shapes, options, padding);
+    let atlas = lay_out(&shapes, options, gutter(options.padding, options.mips));
     match (&atlas, options.padding) {
-        (Err(_), None) => lay_out(&shapes, options, 0).or(atlas),
+        (Err(_), None) => lay_out(&shapes, options, Gutter::new(0, options.mips)).or(atlas),
         _ => atlas,
     }
 }
 
-/// Lays `shapes` out with that much padding.
-fn lay_out(shapes: &[Shape], options: &UnwrapOptions, padding: u32) -> Result<Atlas, UnwrapError> {
-    let padding = padding.min(LARGEST_SIDE);
+fn gutter(padding: Option<u32>, mips: u32) -> Gutter {
+    Gutter::new(padding.unwrap_or(1), mips)
+}
+
+/// The texels around a chart's footprint that its cell takes on each side, on average.
+#[must_use]
+pub fn mean_padding(padding: Option<u32>, mips: u32) -> u32 {
+    let Gutter { padding, align } = gutter(padding, mips);
+    padding + align / 4
+}
+
+/// Lays `shapes` out with that much between them.
+fn lay_out(shapes: &[Shape], options: &UnwrapOptions, gutter: Gutter) -> Result<Atlas, UnwrapError> {
     let most = options.most.unwrap_or(f64::INFINITY);
     let charts = shapes.len();
     let (density, longest) = match options.room {
         Room::Square(side) => {
-            let side = side.min(LARGEST_SIDE);
-            let page = Page { width: side, height: side, padding };
-            let too_small = UnwrapError::TooSmall { charts, padding, side };
+            // Levels of a page whose sides are no multiples of the cells' would not keep to the cells.
+            let side = side.min(LARGEST_SIDE) / gutter.align * gutter.align;
+            let page = Page { width: side, height: side, gutter };
+            let too_small = UnwrapError::TooSmall { charts, padding: gutter.padding, side };
             let layout = fill(shapes, page, most).ok_or(too_small.clone())?;
             if layout.texels_per_metre < most {
                 return layout.atlas(shapes, page).ok_or(too_small);
@@ -173,10 +190,10 @@ fn lay_out(shapes: &[Shape], options: &UnwrapOptions, padding: u32) -> Result<At
             let area: f64 = shapes.iter().map(Shape::weighed_area).sum();
             let bound = (texels / area).sqrt();
             let most = most.min(if bound.is_finite() { bound } else { 1.0 });
-            (density_of_texels(shapes, texels, padding, most), LARGEST_SIDE)
+            (density_of_texels(shapes, texels, gutter, most), LARGEST_SIDE)
         }
     };
     let too_large = UnwrapError::TooLarge { charts, texels_per_metre: density, side: longest };
-    let (page, layout) = least_page(shapes, density, padding, longest).ok_or(too_large.clone())?;
+    let (page, layout) = least_page(shapes, density, gutter, longest).ok_or(too_large.clone())?;
     layout.atlas(shapes, page).ok_or(too_large)
 }

@@ -11,6 +11,43 @@ pub(super) const LARGEST_SIDE: u32 = 16384;
 /// Sides that are not given are multiples of this: block-compressed formats need it.
 pub(super) const STEP: u32 = 4;
 
+/// How far apart charts stay, and where they may begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Gutter {
+    /// Free texels around each footprint.
+    pub(super) padding: u32,
+    /// Charts' cells (footprint and padding) begin and end at multiples of this, a power of two, so that a
+    /// texel of a mip map shows one chart only. Where it is 1, padding may hang over the page's edge.
+    pub(super) align: u32,
+}
+
+impl Gutter {
+    /// For so many mip levels, with at least `padding`.
+    ///
+    /// A lookup in level `n` touches texels of `b = 2ⁿ` whose centres are less than `b` away. With the footprint
+    /// at least `b / 2` inside a cell of whole such texels these are the cell's own, and they are in the
+    /// finer levels then.
+    pub(super) fn new(padding: u32, mips: u32) -> Self {
+        let align = 1 << mips.min(super::MOST_MIPS);
+        Self { padding: padding.max(align / 2).min(LARGEST_SIDE), align }
+    }
+
+    /// Sides that are not given are multiples of this.
+    pub(super) fn step(self) -> u32 {
+        STEP.max(self.align)
+    }
+
+    /// Texels that a cell takes along a side on which its chart has `texels` from the first centre to the last.
+    pub(super) fn cell(self, texels: u32) -> u32 {
+        (texels + 1 + 2 * self.padding).next_multiple_of(self.align)
+    }
+
+    /// The texels by which cells may hang over the page's edge on either side.
+    pub(super) fn overhang(self) -> u32 {
+        if self.align == 1 { self.padding } else { 0 }
+    }
+}
+
 /// A page, and how far apart charts stay in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Page {
@@ -18,19 +55,20 @@ pub(super) struct Page {
     pub(super) width: u32,
     /// Texels.
     pub(super) height: u32,
-    /// Free texels around each footprint; the page's edge needs none.
-    pub(super) padding: u32,
+    /// What lies between charts.
+    pub(super) gutter: Gutter,
 }
 
 impl Page {
-    /// The columns and rows that charts take with their padding, which may hang over the page's edge.
+    /// Columns and rows that there are for cells.
     pub(super) fn grown(&self) -> (u32, u32) {
-        (self.width + 2 * self.padding, self.height + 2 * self.padding)
+        let over = 2 * self.gutter.overhang();
+        (self.width + over, self.height + over)
     }
 
     /// The columns and rows that a chart takes with its padding.
     pub(super) fn cell(&self, chart: &SizedShape<'_>) -> (u32, u32) {
-        (chart.width + 1 + 2 * self.padding, chart.height + 1 + 2 * self.padding)
+        (self.gutter.cell(chart.width), self.gutter.cell(chart.height))
     }
 
     /// As `cell`, in texels of the page.
@@ -39,14 +77,26 @@ impl Page {
         f64::from(width) * f64::from(height)
     }
 
-    /// The page without the columns and rows that no chart reaches, in whole steps of `STEP`.
+    /// The place of a chart whose cell begins at that column and row of those that there are for cells.
+    pub(super) fn place(&self, (x, y): (u32, u32), turn: Turn) -> Place {
+        // The footprint begins `padding` inside the cell, the page `overhang` inside what is there for cells.
+        let inset = self.gutter.padding - self.gutter.overhang();
+        Place { x: x + inset, y: y + inset, turn }
+    }
+
+    /// The page without the columns and rows at its end that no chart reaches.
     pub(super) fn cropped(&self, charts: &[SizedShape<'_>], places: &[Place]) -> Self {
+        let Gutter { padding, .. } = self.gutter;
         let (mut width, mut height) = (1, 1);
         for (chart, place) in charts.iter().zip(places) {
             let (w, h) = chart.turned(place.turn);
-            (width, height) = (width.max(place.x + w + 1), height.max(place.y + h + 1));
+            let end = |at: u32, texels: u32| {
+                // The cell without what hangs over on both sides, from the page's edge on.
+                at + self.gutter.cell(texels) - padding - self.gutter.overhang()
+            };
+            (width, height) = (width.max(end(place.x, w)), height.max(end(place.y, h)));
         }
-        let step = |used: u32, all: u32| used.next_multiple_of(STEP).min(all);
+        let step = |used: u32, all: u32| used.next_multiple_of(self.gutter.step()).min(all);
         Self { width: step(width, self.width), height: step(height, self.height), ..*self }
     }
 }

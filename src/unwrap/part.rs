@@ -27,12 +27,11 @@ pub fn whole(surfaces: &[Surface]) -> Vec<Part> {
     surfaces.iter().enumerate().map(of).collect()
 }
 
-/// The area of what a part holds of its surface, as many times over as its weights say.
-pub(crate) fn weighed_area(part: &Part, surface: &Surface) -> f64 {
+/// The area of what of a surface lies in a convex polygon, square metres.
+pub(crate) fn area_within(surface: &Surface, outline: &Ring) -> f64 {
     let triangles = surface.regions.iter().flat_map(|r| &r.triangles);
-    let inside = triangles.map(|&t| clip(t, &part.outline));
-    let area: f64 = inside.map(|ring| signed_area(&ring)).sum();
-    area.abs() * part.weight.element_product()
+    let inside = triangles.map(|&t| clip(t, outline));
+    inside.map(|ring| signed_area(&ring)).sum::<f64>().abs()
 }
 
 /// What of a triangle lies in a convex polygon, counter-clockwise: the triangle itself where that is all of it.

@@ -56,7 +56,9 @@ impl Nesting {
         let work = (shapes.len() as u64).saturating_mul(texels);
         let area: f64 = shapes.iter().map(Shape::weighed_area).sum();
         let bounds: f64 = shapes.iter().map(|s| (s.extent * s.weight).element_product()).sum();
-        (area < (1.0 - LEAST_WASTE) * bounds && work <= MOST_WORK).then_some(Self(()))
+        // xatlas knows no cells.
+        let is_free = page.gutter.align == 1;
+        (is_free && area < (1.0 - LEAST_WASTE) * bounds && work <= MOST_WORK).then_some(Self(()))
     }
 }
 
@@ -95,7 +97,7 @@ impl Packer for Nesting {
         xatlas.add_uv_mesh(&decl).ok()?;
         xatlas.compute_charts(&ChartOptions::default());
         xatlas.pack_charts(&PackOptions {
-            padding: page.padding,
+            padding: page.gutter.padding,
             texels_per_unit: 1.0,
             resolution: page.width,
             bilinear: true,
