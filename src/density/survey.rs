@@ -34,6 +34,9 @@ const LEAST_SAMPLES: f64 = 1.2;
 /// between these so many for each emitter that they have to ask.
 const SAMPLES_BY_EMITTERS: f64 = 10.0;
 
+/// However few texels there are, so many samples are taken: a scene has to be looked at to be cut well.
+const FEWEST_SAMPLES: f64 = 50_000.0;
+
 /// How often it is decided anew where to look closer.
 const ROUNDS: u32 = 10;
 
@@ -82,7 +85,7 @@ pub(super) fn survey(lighting: &Lighting, options: DensityOptions) -> Surveys {
     };
     let mut quarters = look(&tiles);
     let by_cost = SAMPLES_BY_EMITTERS / (1 + lighting.emitters()) as f64;
-    let budget = (by_cost.clamp(LEAST_SAMPLES, MOST_SAMPLES) * options.texels) as u64;
+    let budget = (by_cost.clamp(LEAST_SAMPLES, MOST_SAMPLES) * options.texels).max(FEWEST_SAMPLES) as u64;
     let mut left = budget;
 
     let mut price = 0.0;
