@@ -29,7 +29,7 @@ const STEPS: usize = 2;
 const SPARE: f64 = 0.2;
 
 /// Searches for the price that fills the page.
-const TRIES: u32 = 16;
+const TRIES: u32 = 30;
 
 /// All surfaces' parts, together of as many texels as the options allow.
 pub(super) fn cut(surfaces: &[Surface], surveys: &Surveys, options: DensityOptions) -> Vec<Part> {
@@ -74,7 +74,7 @@ impl<'a> Forest<'a> {
         let (mut low, mut high) = (least.ln(), most.ln());
         let mut best = None;
         let mut middle = (self.price / SPARE).ln().clamp(low, high);
-        for _ in 0..TRIES {
+        for attempt in 0..TRIES {
             let leaves = self.pruned(middle.exp());
             let taken = leaves.iter().flatten().map(|l| l.texels).sum::<f64>();
             tracing::debug!(price = middle.exp(), taken, "cut");
@@ -89,7 +89,9 @@ impl<'a> Forest<'a> {
             }
             // Texels go with about the -0.6th power of the price.
             let towards = middle + 1.7 * (taken / (0.992 * texels)).ln();
-            middle = if towards > low && towards < high { towards } else { 0.5 * (low + high) };
+            // Where they jump with the price, guesses creep; halving does not.
+            let is_useful = attempt % 3 != 2 && towards > low && towards < high;
+            middle = if is_useful { towards } else { 0.5 * (low + high) };
         }
         (high.exp(), best.unwrap_or_else(|| self.pruned(most)))
     }
