@@ -27,8 +27,11 @@ use crate::surface::Surface;
 use crate::trace::Tracer;
 use crate::unwrap::Chart;
 
-/// Blocks of no more texels than this are not halved further.
+/// Blocks of no more texels than this are not halved further: where texels at an edge are fitted, small ones tell
+/// best which have to be;
 const SMALL_BLOCK: usize = 8;
+/// where each point is asked once, a few occluders more cost less than another shaft.
+const SMALL_BLOCK_ONCE: usize = 24;
 
 /// Blocks of so many texels are looked at for smooth penumbrae.
 const SMOOTH_BLOCKS: std::ops::RangeInclusive<usize> = 17..=1024;
@@ -87,6 +90,16 @@ pub(super) enum Edges {
     Fitted,
     /// Each texel has the light at its own point.
     Once,
+}
+
+impl Edges {
+    /// Blocks of no more texels than this are not halved further.
+    fn small_block(self) -> usize {
+        match self {
+            Self::Fitted => SMALL_BLOCK,
+            Self::Once => SMALL_BLOCK_ONCE,
+        }
+    }
 }
 
 impl LitTexel {
@@ -242,7 +255,7 @@ impl Shining<'_> {
             return Done::of(TexelWays { behind: count, ..TexelWays::default() }, Effort::default());
         }
         // A block that is not much smaller than the one before has about the same shaft.
-        if texels.len() > SMALL_BLOCK.max(inherited.texels / BLOCKS_A_SHAFT) {
+        if texels.len() > self.light.edges.small_block().max(inherited.texels / BLOCKS_A_SHAFT) {
             return self.halve(texels, extent, inherited);
         }
         let between = self.emitter.between(&hull, tracer, inherited.between);
@@ -253,7 +266,7 @@ impl Shining<'_> {
         if self.light.occluders.one_hides(&hull, self.emitter, tracer, &between) {
             return Done::of(TexelWays { umbra: count, ..TexelWays::default() }, Effort::default());
         }
-        if texels.len() <= SMALL_BLOCK {
+        if texels.len() <= self.light.edges.small_block() {
             return self.shadow_edge(texels, &self.light.occluders.polygons(tracer, &between));
         }
         if SMOOTH_BLOCKS.contains(&texels.len())
