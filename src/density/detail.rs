@@ -59,7 +59,9 @@ mod tests {
 
     fn grid(light: impl Fn(f64, f64) -> f64) -> Vec<Option<PointLight>> {
         let at = |k: usize| light((k % 9) as f64 / 8.0, (k / 9) as f64 / 8.0);
-        (0..81).map(|k| Some(PointLight { irradiance: DVec3::splat(at(k)), doubtful: 0.0 })).collect()
+        (0..81)
+            .map(|k| Some(PointLight { irradiance: DVec3::splat(at(k)), doubtful: 0.0, is_centre: true }))
+            .collect()
     }
 
     /// Linear interpolation of x² at spacing h misses h²/4 in the middle: a surplus that falls fourfold a halving.

@@ -5,13 +5,15 @@
 //! something between an emitter and a quarter may hide or let through unseen between the samples counts
 //! as such a change, until these are as close as texels of one density would be.
 
-use glam::{DAffine2, DMat2, DVec2};
+use std::sync::Arc;
+
+use glam::{DAffine2, DMat2, DVec2, Vec3};
 use rayon::prelude::*;
 
 use super::detail::Grid;
 use super::{Cell, DensityOptions, Energy, LEVELS, SurfaceSurvey};
 use crate::geom::polygon::rectangle;
-use crate::raster::Lighting;
+use crate::raster::{CloserLook, Lighting, PointLight, Shadowing};
 use crate::surface::Surface;
 use crate::unwrap::Chart;
 
@@ -57,11 +59,13 @@ pub(super) struct Surveys {
 }
 
 /// A rectangle of a surface, how finely it was looked at, and what was found.
-#[derive(Clone, Copy)]
 struct Quarter {
     surface: usize,
     min: DVec2,
     max: DVec2,
+    /// What is known of its tile, and which of the four it is, column and row.
+    found: Arc<Found>,
+    at: [usize; 2],
     /// Cells of the tile that it is a quarter of; also those of its own tile.
     cells: [usize; 2],
     /// Halvings so far, for either axis.
@@ -69,6 +73,13 @@ struct Quarter {
     energy: Energy,
     /// Mean squared error that shadows between the samples may hide.
     doubt: f64,
+}
+
+/// What a tile's samples told.
+struct Found {
+    /// Where they lie in the surface, for the finer tiles that share them.
+    light: Vec<Option<Vec3>>,
+    shadowing: Option<Shadowing>,
 }
 
 /// Looks at the light on all surfaces.
@@ -164,7 +175,7 @@ impl Root {
             let at = DVec2::new((k % self.tiles[0]) as f64, (k / self.tiles[0]) as f64);
             let min = self.min + at * size;
             let levels = self.cells.map(|c| c.ilog2() as usize);
-            Tile { surface, min, max: min + size, cells: self.cells, levels, blind_spacing, known: None }
+            Tile { surface, min, max: min + size, cells: self.cells, levels, blind_spacing, coarser: None }
         };
         (0..self.tiles[0] * self.tiles[1]).map(tile).collect()
     }
@@ -188,8 +199,17 @@ struct Tile {
     levels: [usize; 2],
     /// Shadows may hide between samples farther apart than this, metres.
     blind_spacing: f64,
-    /// What coarser samples told, if there were any.
-    known: Option<Energy>,
+    /// What it is looked at closer for, if there were coarser samples.
+    coarser: Option<Coarser>,
+}
+
+/// What coarser samples told of a tile.
+struct Coarser {
+    energy: Energy,
+    /// The tile that it is a quarter of.
+    found: Arc<Found>,
+    /// Which quarter of that.
+    at: [usize; 2],
 }
 
 impl Tile {
@@ -209,24 +229,55 @@ impl Tile {
                 DVec2::splat(0.5) - scale * self.min,
             ),
         };
-        let light = lighting.at_centres(&chart, (self.cells[0] as u32 + 1, self.cells[1] as u32 + 1));
-        let grid = Grid { cells: self.cells, light: &light };
-        (0..4).filter_map(|k| self.quarter(&grid, [k % 2, k / 2])).collect()
+        let size = (self.cells[0] as u32 + 1, self.cells[1] as u32 + 1);
+        let mut look = match &self.coarser {
+            None => lighting.at_centres(&chart, size, None),
+            Some(coarser) => {
+                let is_known = |node: [u32; 2]| self.known(coarser, node.map(|n| n as usize)).is_some();
+                let closer = CloserLook { is_known: &is_known, shadowing: coarser.found.shadowing.as_ref() };
+                lighting.at_centres(&chart, size, Some(&closer))
+            }
+        };
+        if let Some(coarser) = &self.coarser {
+            for (index, light) in look.light.iter_mut().enumerate() {
+                let node = [index % size.0 as usize, index / size.0 as usize];
+                if let Some(known) = self.known(coarser, node) {
+                    *light = Some(known);
+                }
+            }
+        }
+        let centre =
+            |light: &Option<PointLight>| light.and_then(|l| l.is_centre.then(|| l.irradiance.as_vec3()));
+        let found = Found { light: look.light.iter().map(centre).collect(), shadowing: look.shadowing };
+        let found = Arc::new(found);
+        let grid = Grid { cells: self.cells, light: &look.light };
+        (0..4).filter_map(|k| self.quarter(&grid, &found, [k % 2, k / 2])).collect()
+    }
+
+    /// The light at a node that the coarser samples had, too. Whether something hides between them is no longer
+    /// told by these.
+    fn known(&self, coarser: &Coarser, [x, y]: [usize; 2]) -> Option<PointLight> {
+        if x % 2 == 1 || y % 2 == 1 {
+            return None;
+        }
+        let [column, row] = [0, 1].map(|axis| (coarser.at[axis] * self.cells[axis] + [x, y][axis]) / 2);
+        let light = coarser.found.light[row * (self.cells[0] + 1) + column]?;
+        Some(PointLight { irradiance: light.as_dvec3(), doubtful: 0.0, is_centre: true })
     }
 
     /// One of the four quarters; `None` where nothing of the surface lies in it.
-    fn quarter(&self, grid: &Grid, at: [usize; 2]) -> Option<Quarter> {
+    fn quarter(&self, grid: &Grid, found: &Arc<Found>, at: [usize; 2]) -> Option<Quarter> {
         let half = self.cells.map(|c| c / 2);
         let low = [at[0] * half[0], at[1] * half[1]];
         let high = [low[0] + half[0], low[1] + half[1]];
         let doubtful = grid.doubtful(low, high)?;
-        let mut energy = self.known.unwrap_or_default();
+        let mut energy = self.coarser.as_ref().map(|c| c.energy).unwrap_or_default();
         for axis in 0..2 {
             // Coarser halvings are known from the tile that this one is a quarter of.
-            let steps = if self.known.is_some() { 1 } else { self.levels[axis] };
+            let steps = if self.coarser.is_some() { 1 } else { self.levels[axis] };
             for step in 0..steps {
-                let found = grid.energy(axis, 1 << step, low, high);
-                energy[axis][self.levels[axis] - 1 - step] = found as f32;
+                let change = grid.energy(axis, 1 << step, low, high);
+                energy[axis][self.levels[axis] - 1 - step] = change as f32;
             }
         }
         let middle = 0.5 * (self.min + self.max);
@@ -235,7 +286,8 @@ impl Tile {
         };
         let (min, max) = (pick(self.min, middle), pick(middle, self.max));
         let (surface, cells, levels) = (self.surface, self.cells, self.levels);
-        let mut quarter = Quarter { surface, min, max, cells, levels, energy, doubt: 0.0 };
+        let found = Arc::clone(found);
+        let mut quarter = Quarter { surface, min, max, found, at, cells, levels, energy, doubt: 0.0 };
         if quarter.spacing().max_element() > self.blind_spacing {
             quarter.doubt = DOUBT * doubtful * doubtful;
         }
@@ -255,8 +307,9 @@ impl Quarter {
 
     /// The tile that looks closer.
     fn tile(&self, blind_spacing: f64) -> Tile {
-        let Self { surface, min, max, cells, levels, energy, .. } = *self;
-        Tile { surface, min, max, cells, levels: levels.map(|l| l + 1), blind_spacing, known: Some(energy) }
+        let Self { surface, min, max, at, cells, levels, energy, .. } = *self;
+        let coarser = Some(Coarser { energy, found: Arc::clone(&self.found), at });
+        Tile { surface, min, max, cells, levels: levels.map(|l| l + 1), blind_spacing, coarser }
     }
 
     /// What the last halving changed, and what may be hidden, for each sample that another one takes.

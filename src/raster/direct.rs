@@ -39,6 +39,9 @@ const SMOOTH_BLOCKS: std::ops::RangeInclusive<usize> = 17..=1024;
 /// A block this many times smaller than the one whose shaft it inherited gets a shaft of its own.
 const BLOCKS_A_SHAFT: usize = 3;
 
+/// So many triangles that stand before a part of a surface are remembered for its parts.
+const MOST_REMEMBERED: usize = 512;
+
 /// Blocks of more texels than this are worked on side by side.
 const PARALLEL_BLOCK: usize = 4096;
 
@@ -166,6 +169,37 @@ impl DirectLight<'_> {
     }
 }
 
+impl DirectLight<'_> {
+    /// Adds what all emitters send to `texels` within a chart that covers a rectangle of a surface, each asked
+    /// once. What stands in the way is found among what stands before a larger rectangle, where that is `known`.
+    pub(super) fn shine_once(
+        &self,
+        surface: &Surface,
+        chart: &Chart,
+        texels: &mut [LitTexel],
+        known: Option<&Shadowing>,
+    ) -> Shadowing {
+        let plane_from_texel = chart.texel_from_plane.inverse();
+        let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
+        let outline = &chart.outline;
+        let corners = |pick: fn(DVec2, DVec2) -> DVec2| outline.iter().copied().reduce(pick);
+        let whole = (corners(DVec2::min).unwrap_or_default(), corners(DVec2::max).unwrap_or_default());
+        let extent = extent(texels);
+        let of = |(index, emitter): (usize, &Emitter)| {
+            let work = Shining { light: self, surface, outline, plane_from_texel, cover, emitter };
+            let standing = work.standing(&work.block(whole), known.map(|k| &k.0[index]));
+            if !texels.is_empty() {
+                work.shine_past(texels, extent, &work.block(extent), &standing);
+            }
+            for texel in texels.iter_mut() {
+                texel.direct += std::mem::take(&mut texel.now);
+            }
+            standing
+        };
+        Shadowing(self.emitters.iter().enumerate().map(of).collect())
+    }
+}
+
 /// Lets the texels at a shadow's edge, and those beside them, fit the samples.
 ///
 /// The ones beside the edge have no samples yet: their light is about the same all over.
@@ -188,6 +222,25 @@ fn fit_edges(texels: &mut [LitTexel], mut samples: Vec<LightSample>) {
         texel.now = fitted.value;
     }
 }
+
+/// What stands between an emitter and a part of a surface.
+#[derive(Clone, Debug)]
+enum Standing {
+    /// The one lies behind the other: no light arrives.
+    Behind,
+    /// Nothing: all light arrives.
+    Nothing,
+    /// One occluder that hides the whole emitter: no light arrives.
+    Umbra,
+    /// These triangles reach into the shaft, ascending.
+    Some(Vec<u32>),
+    /// More triangles than are worth remembering do.
+    Many,
+}
+
+/// What stands between all emitters and a part of a surface.
+#[derive(Clone, Debug)]
+pub struct Shadowing(Vec<Standing>);
 
 /// What came of a block.
 #[derive(Default)]
@@ -244,37 +297,83 @@ fn extent(texels: &[LitTexel]) -> (DVec2, DVec2) {
 
 impl Shining<'_> {
     fn shine_on(&self, texels: &mut [LitTexel], extent: (DVec2, DVec2), inherited: Inherited) -> Done {
-        let tracer = self.light.tracer;
-        let frame = &self.surface.frame;
         if texels.is_empty() {
             return Done::default();
         }
         let hull = self.block(extent);
-        let count = texels.len() as u64;
-        if self.emitter.is_behind(&hull, frame.normal, tracer.margin()) {
-            return Done::of(TexelWays { behind: count, ..TexelWays::default() }, Effort::default());
+        if self.emitter.is_behind(&hull, self.surface.frame.normal, self.light.tracer.margin()) {
+            return self.shine_past(texels, extent, &hull, &Standing::Behind);
         }
         // A block that is not much smaller than the one before has about the same shaft.
         if texels.len() > self.light.edges.small_block().max(inherited.texels / BLOCKS_A_SHAFT) {
             return self.halve(texels, extent, inherited);
         }
-        let between = self.emitter.between(&hull, tracer, inherited.between);
+        let standing = self.standing_before(&hull, inherited.between);
+        self.shine_past(texels, extent, &hull, &standing)
+    }
+
+    /// What stands before a rectangle, told from what is `known` of a larger one.
+    fn standing(&self, hull: &[DVec3; 4], known: Option<&Standing>) -> Standing {
+        let found = match known {
+            Some(known @ (Standing::Behind | Standing::Nothing | Standing::Umbra)) => return known.clone(),
+            _ if self.emitter.is_behind(hull, self.surface.frame.normal, self.light.tracer.margin()) => {
+                return Standing::Behind;
+            }
+            Some(Standing::Some(between)) => self.standing_before(hull, Some(between)),
+            Some(Standing::Many) | None => self.standing_before(hull, None),
+        };
+        match found {
+            Standing::Some(between) if between.len() > MOST_REMEMBERED => Standing::Many,
+            found => found,
+        }
+    }
+
+    /// What stands before a block that is not behind the emitter.
+    fn standing_before(&self, hull: &[DVec3; 4], inherited: Option<&[u32]>) -> Standing {
+        let tracer = self.light.tracer;
+        let between = self.emitter.between(hull, tracer, inherited);
         if between.is_empty() {
-            let effort = self.shine_freely(texels);
-            return Done::of(TexelWays { lit: count, ..TexelWays::default() }, effort);
+            Standing::Nothing
+        } else if self.light.occluders.one_hides(hull, self.emitter, tracer, &between) {
+            Standing::Umbra
+        } else {
+            Standing::Some(between)
         }
-        if self.light.occluders.one_hides(&hull, self.emitter, tracer, &between) {
-            return Done::of(TexelWays { umbra: count, ..TexelWays::default() }, Effort::default());
-        }
+    }
+
+    fn shine_past(
+        &self,
+        texels: &mut [LitTexel],
+        extent: (DVec2, DVec2),
+        hull: &[DVec3; 4],
+        standing: &Standing,
+    ) -> Done {
+        let count = texels.len() as u64;
+        let between = match standing {
+            Standing::Behind => {
+                return Done::of(TexelWays { behind: count, ..TexelWays::default() }, Effort::default());
+            }
+            Standing::Umbra => {
+                return Done::of(TexelWays { umbra: count, ..TexelWays::default() }, Effort::default());
+            }
+            Standing::Nothing => {
+                let effort = self.shine_freely(texels);
+                return Done::of(TexelWays { lit: count, ..TexelWays::default() }, effort);
+            }
+            Standing::Some(between) => between,
+            Standing::Many => {
+                return self.shine_on(texels, extent, Inherited { between: None, texels: usize::MAX });
+            }
+        };
         if texels.len() <= self.light.edges.small_block() {
-            return self.shadow_edge(texels, &self.light.occluders.polygons(tracer, &between));
+            return self.shadow_edge(texels, &self.light.occluders.polygons(self.light.tracer, between));
         }
         if SMOOTH_BLOCKS.contains(&texels.len())
-            && let Some(done) = self.smooth_penumbra(texels, extent, &hull, &between)
+            && let Some(done) = self.smooth_penumbra(texels, extent, hull, between)
         {
             return done;
         }
-        let own = Inherited { between: Some(&between), texels: texels.len() };
+        let own = Inherited { between: Some(between), texels: texels.len() };
         self.halve(texels, extent, own)
     }
 

@@ -34,6 +34,7 @@ use cover::{Cover, take_after_neighbours};
 use coverage::chart_sites;
 pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
+pub use direct::Shadowing;
 use direct::{DirectLight, Edges, LitTexel, texel_steps};
 use locate::TriangleLocator;
 pub use seams::SeamReport;
@@ -78,6 +79,23 @@ pub struct Lighting<'a> {
     locators: Vec<TriangleLocator<'a>>,
 }
 
+/// What [`Lighting::at_centres`] found.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// Texel by texel.
+    pub light: Vec<Option<PointLight>>,
+    /// What stands between the rectangle and what shines; `None` where that was not asked.
+    pub shadowing: Option<Shadowing>,
+}
+
+/// What is known of a rectangle from a look at a larger one.
+pub struct CloserLook<'a> {
+    /// Whether the light at a texel, column and row, is known.
+    pub is_known: &'a dyn Fn([u32; 2]) -> bool,
+    /// What stands before the larger one.
+    pub shadowing: Option<&'a Shadowing>,
+}
+
 /// The light at a point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
@@ -85,6 +103,8 @@ pub struct PointLight {
     pub irradiance: DVec3,
     /// Luminance of the light that shadows between this point and the next may hide or let through.
     pub doubtful: f64,
+    /// Whether the point is the texel's centre, not the nearest of a surface that ends before it.
+    pub is_centre: bool,
 }
 
 /// What rasterizing took.
@@ -124,25 +144,31 @@ impl<'a> Lighting<'a> {
         self.input.emitters.len()
     }
 
-    /// The irradiance at the texel centres of a page of `size` texels that `chart` alone lies in, row by row;
-    /// `None` where nothing of the surface that is seen is near.
+    /// The irradiance at the texel centres of a page of `size` texels that `chart`, a rectangle of its surface,
+    /// alone lies in, row by row; `None` where nothing of the surface that is seen is near, or where light
+    /// [`is known`](CloserLook::is_known).
     #[must_use]
-    pub fn at_centres(&self, chart: &Chart, size: (u32, u32)) -> Vec<Option<PointLight>> {
+    pub fn at_centres(&self, chart: &Chart, size: (u32, u32), closer: Option<&CloserLook>) -> Look {
         let surface = &self.input.surfaces[chart.surface];
         let sites = chart_sites(surface, chart, size, &|region| !self.buried[chart.surface][region]);
-        let seen = sites.iter().enumerate().filter(|(_, s)| s.position != SitePosition::Buried);
-        let mut texels: Vec<LitTexel> = seen.map(|(index, site)| LitTexel::new(index, site)).collect();
-        if self.input.options.direct == Direct::Texel {
-            self.direct(Edges::Once).shine(surface, chart, &mut texels);
-        }
+        let is_wanted = |site: &TexelSite| {
+            site.position != SitePosition::Buried && !closer.is_some_and(|c| (c.is_known)([site.x, site.y]))
+        };
+        let wanted = sites.iter().enumerate().filter(|(_, site)| is_wanted(site));
+        let mut texels: Vec<LitTexel> = wanted.map(|(index, site)| LitTexel::new(index, site)).collect();
+        let shadowing = (self.input.options.direct == Direct::Texel).then(|| {
+            let known = closer.and_then(|c| c.shadowing);
+            self.direct(Edges::Once).shine_once(surface, chart, &mut texels, known)
+        });
         self.add_indirect(chart.surface, &mut texels);
         let mut light = vec![None; size.0 as usize * size.1 as usize];
         for texel in &texels {
             let at = texel.cell[1] as usize * size.0 as usize + texel.cell[0] as usize;
             let irradiance = texel.direct + texel.indirect;
-            light[at] = Some(PointLight { irradiance, doubtful: texel.doubtful });
+            let is_centre = sites[texel.site].position == SitePosition::Centre;
+            light[at] = Some(PointLight { irradiance, doubtful: texel.doubtful, is_centre });
         }
-        light
+        Look { light, shadowing }
     }
 
     fn direct(&self, edges: Edges) -> DirectLight<'a> {
