@@ -281,7 +281,10 @@ impl<'a> Cutter<'a> {
         }
         let error = [0, 1].map(|axis| sum.errors(axis));
         let texels: [[f64; STEPS * LEVELS]; 2] = [0, 1].map(|axis| {
-            std::array::from_fn(|step| (extent[axis] / self.spacings[axis][step]).round().max(1.0))
+            // As `round`, which is slow where the processor is not known to have it.
+            std::array::from_fn(|step| {
+                f64::from((extent[axis] / self.spacings[axis][step] + 0.5) as u32).max(1.0)
+            })
         });
         // No spacing is wider than the part, none narrower than was looked at (an edge that seemed to run along
         // an axis may not), and none so narrow that the chart is longer than the page.
