@@ -117,6 +117,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         patch_size: scale.patch_size,
         threshold: scale.threshold,
         indirect_threshold: scale.indirect_threshold,
+        texel: scale.texel,
     };
     let solution = solve(&problem, facets, &mut |done| {
         recorder.advance(done);

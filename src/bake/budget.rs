@@ -54,26 +54,15 @@ pub(super) fn texels_for(bytes: u64, quantity: Quantity) -> f64 {
 
 /// The fullest page found that takes at most `budget` bytes.
 pub(super) fn within(maker: &PageMaker, budget: u64, recorder: &mut Recorder) -> Result<Page, Error> {
-    let first = texels_for(budget, maker.options().quantity);
-    let mut search = Search { budget: budget as f64, first, tries: Vec::new() };
-    let mut best: Option<(u64, Page)> = None;
+    let padding = maker.options().padding;
     let mut rays = 0;
-    while let Some(texels) = search.next() {
-        let page = maker.page_of(Room::Texels(texels), recorder)?;
-        let bytes = bytes_of(maker, &page, recorder)?;
-        rays += page.texels.effort.rays;
-        // Charts that do not want the texels that there are for them will not want more.
-        let grown = |side: u32| f64::from(side + 2 * page.atlas.padding);
-        let made = grown(page.atlas.width) * grown(page.atlas.height);
-        let is_sated = made < POOR * texels;
-        tracing::debug!(texels, made, bytes, budget, "budget");
-        search.tries.push(Try { texels, bytes: bytes as f64, is_sated });
-        if bytes <= budget && best.as_ref().is_none_or(|(most, _)| bytes > *most) {
-            best = Some((bytes, page));
-        }
+    let mut best = search(maker, (budget, padding), &mut rays, recorder)?;
+    if best.is_none() && padding.is_none() {
+        // Many small charts are mostly padding.
+        best = search(maker, (budget, Some(0)), &mut rays, recorder)?;
     }
     let mut page = match best {
-        Some((_, page)) => page,
+        Some(page) => page,
         None => {
             let page = maker.least_page(recorder)?;
             let least = bytes_of(maker, &page, recorder)?;
@@ -86,6 +75,33 @@ pub(super) fn within(maker: &PageMaker, budget: u64, recorder: &mut Recorder) ->
     };
     page.texels.effort.rays = rays;
     Ok(page)
+}
+
+/// The fullest page found with that padding; counts the `rays` that all took.
+fn search(
+    maker: &PageMaker,
+    (budget, padding): (u64, Option<u32>),
+    rays: &mut u64,
+    recorder: &mut Recorder,
+) -> Result<Option<Page>, Error> {
+    let first = texels_for(budget, maker.options().quantity);
+    let mut search = Search { budget: budget as f64, first, tries: Vec::new() };
+    let mut best: Option<(u64, Page)> = None;
+    while let Some(texels) = search.next() {
+        let page = maker.page_of(Room::Texels(texels), padding, recorder)?;
+        let bytes = bytes_of(maker, &page, recorder)?;
+        *rays += page.texels.effort.rays;
+        // Charts that do not want the texels that there are for them will not want more.
+        let grown = |side: u32| f64::from(side + 2 * page.atlas.padding);
+        let made = grown(page.atlas.width) * grown(page.atlas.height);
+        let is_sated = made < POOR * texels;
+        tracing::debug!(texels, made, bytes, budget, "budget");
+        search.tries.push(Try { texels, bytes: bytes as f64, is_sated });
+        if bytes <= budget && best.as_ref().is_none_or(|(most, _)| bytes > *most) {
+            best = Some((bytes, page));
+        }
+    }
+    Ok(best.map(|(_, page)| page))
 }
 
 fn bytes_of(maker: &PageMaker, page: &Page, recorder: &mut Recorder) -> Result<u64, Error> {

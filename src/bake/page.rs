@@ -56,7 +56,7 @@ impl<'a> PageMaker<'a> {
     ) -> Self {
         let mut maker = Self { lighting, options, texel, survey: None, weights };
         if options.density == DensityPolicy::Light {
-            let density = maker.density(maker.room());
+            let density = maker.density(maker.room(), options.padding);
             maker.survey = Some(LightSurvey::of(lighting, density));
         }
         maker
@@ -66,14 +66,19 @@ impl<'a> PageMaker<'a> {
     pub(super) fn page(&self, recorder: &mut Recorder) -> Result<Page, Error> {
         match self.options.resolution {
             Resolution::Bytes(bytes) => budget::within(self, bytes, recorder),
-            _ => self.page_of(self.room(), recorder),
+            _ => self.page_of(self.room(), self.options.padding, recorder),
         }
     }
 
-    /// A page of that size.
-    pub(super) fn page_of(&self, room: Room, recorder: &mut Recorder) -> Result<Page, Error> {
+    /// A page of that size; `padding` as in the options.
+    pub(super) fn page_of(
+        &self,
+        room: Room,
+        padding: Option<u32>,
+        recorder: &mut Recorder,
+    ) -> Result<Page, Error> {
         enter(recorder, Stage::Unwrap)?;
-        let atlas = self.lay_out(room)?;
+        let atlas = self.lay_out(room, padding)?;
         self.paint(atlas, recorder)
     }
 
@@ -81,8 +86,7 @@ impl<'a> PageMaker<'a> {
     pub(super) fn least_page(&self, recorder: &mut Recorder) -> Result<Page, Error> {
         enter(recorder, Stage::Unwrap)?;
         let surfaces = self.lighting.surfaces();
-        let padding = Some(self.options.padding.unwrap_or(0));
-        let unwrapping = UnwrapOptions { padding, ..self.unwrapping(Room::Texels(0.0)) };
+        let unwrapping = self.unwrapping(Room::Texels(0.0), Some(self.options.padding.unwrap_or(0)));
         let atlas = unwrap(surfaces, &whole(surfaces), &unwrapping)?;
         self.paint(atlas, recorder)
     }
@@ -111,14 +115,13 @@ impl<'a> PageMaker<'a> {
         }
     }
 
-    fn unwrapping(&self, room: Room) -> UnwrapOptions {
-        let &BakeOptions { padding, mips, .. } = self.options;
-        UnwrapOptions { padding, mips, ..UnwrapOptions::new(room) }
+    fn unwrapping(&self, room: Room, padding: Option<u32>) -> UnwrapOptions {
+        UnwrapOptions { padding, mips: self.options.mips, ..UnwrapOptions::new(room) }
     }
 
-    fn lay_out(&self, room: Room) -> Result<Atlas, UnwrapError> {
+    fn lay_out(&self, room: Room, padding: Option<u32>) -> Result<Atlas, UnwrapError> {
         let surfaces = self.lighting.surfaces();
-        let mut unwrapping = self.unwrapping(room);
+        let mut unwrapping = self.unwrapping(room, padding);
         let parts = match &self.survey {
             None => {
                 let mut parts = whole(surfaces);
@@ -126,7 +129,7 @@ impl<'a> PageMaker<'a> {
                 parts
             }
             Some(survey) => {
-                let mut parts = survey.cut(surfaces, &self.weights, self.density(room));
+                let mut parts = survey.cut(surfaces, &self.weights, self.density(room, padding));
                 let mean = normalize(surfaces, &mut parts);
                 if !matches!(room, Room::Density(_)) {
                     unwrapping.most = Some(SPARE * mean);
@@ -138,7 +141,7 @@ impl<'a> PageMaker<'a> {
     }
 
     /// What deciding on density must know of the page.
-    fn density(&self, room: Room) -> DensityOptions {
+    fn density(&self, room: Room, padding: Option<u32>) -> DensityOptions {
         let texels = match room {
             Room::Square(side) => FILLED * f64::from(side).powi(2),
             Room::Density(density) => {
@@ -151,7 +154,7 @@ impl<'a> PageMaker<'a> {
             Room::Square(side) => f64::from(side) - 1.0,
             _ => LONGEST * texels.sqrt(),
         };
-        let padding = mean_padding(self.options.padding, self.options.mips);
+        let padding = mean_padding(padding, self.options.mips);
         DensityOptions { texels, longest, padding, uniform_texel: self.texel }
     }
 }

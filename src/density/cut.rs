@@ -28,6 +28,10 @@ const STEPS: usize = 2;
 /// Trees are cut as would pay at this fraction of the expected price.
 const SPARE: f64 = 0.2;
 
+/// No texel is longer than this many times its width: along an edge that is all but parallel to an axis light
+/// is not quite even.
+const MOST_SLENDER: f64 = 16.0;
+
 /// Searches for the price that fills the page.
 const TRIES: u32 = 30;
 
@@ -295,6 +299,12 @@ impl<'a> Cutter<'a> {
             longest.min(STEPS * sum.levels[axis]).clamp(first[axis], LAST)
         });
         let cost = |[x, y]: [usize; 2]| {
+            let (width, height) = (self.spacings[0][x], self.spacings[1][y]);
+            let is_slender = (x < last[0] && width > MOST_SLENDER * height)
+                || (y < last[1] && height > MOST_SLENDER * width);
+            if is_slender {
+                return f64::INFINITY;
+            }
             let chart = self.chart_texels([texels[0][x], texels[1][y]]);
             error[0][x] + error[1][y] + self.price * (CHART + chart)
         };

@@ -42,10 +42,10 @@ use patches::{Energy, Patches, Receiver};
 use umbra::Occluders;
 
 /// Light in narrow gaps is followed for so many reflections at most,
-const MOST_SWEEPS: u32 = 12;
+const MOST_SWEEPS: u32 = 24;
 
 /// or until none changes it by more than this fraction,
-const UNSETTLED: f64 = 0.01;
+const UNSETTLED: f64 = 0.0025;
 
 /// and at first everywhere.
 const ANY: f64 = -1.0;
@@ -68,6 +68,8 @@ pub struct Problem<'a> {
     pub threshold: f64,
     /// The same for reflected light.
     pub indirect_threshold: f64,
+    /// A texel's side if all were alike, metres.
+    pub texel: f64,
 }
 
 /// Light in balance.
@@ -144,7 +146,14 @@ pub fn solve(
     let (gathering, gather_error) = if patches.shots == 0 {
         (GatherCounts::default(), problem.options.gather_error.unwrap_or(COARSEST))
     } else {
-        gather_reflected(&pass, &patches, (&locator, problem.surfaces), &after, &mut facets, progress)?
+        gather_reflected(
+            &pass,
+            &patches,
+            (&locator, problem.surfaces, problem.texel),
+            &after,
+            &mut facets,
+            progress,
+        )?
     };
     let emitters: Vec<Emitter> = glowing.into_iter().chain(lights).collect();
     Some(Solution {
@@ -168,7 +177,7 @@ pub fn solve(
 fn gather_reflected(
     pass: &DirectPass,
     patches: &Patches,
-    (locator, surfaces): (&FacetLocator, &[Surface]),
+    (locator, surfaces, texel): (&FacetLocator, &[Surface], f64),
     received: &[DVec3],
     facets: &mut [Facet],
     progress: &mut dyn FnMut(f64) -> bool,
@@ -180,7 +189,7 @@ fn gather_reflected(
     let directions = Directions::prepare();
     let mut counts = GatherCounts::default();
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
-    let texels = area / pass.indirect_threshold.powi(2);
+    let texels = area / texel.powi(2);
     let gather_from = |receivers: &[Vec<Receiver>], round: (Round, f64), facets: &mut [Facet]| {
         let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
         let hot_spots = hot.emitters(&field, facets);

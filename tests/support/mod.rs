@@ -148,6 +148,7 @@ impl Case<'_> {
             patch_size: self.patch_size,
             threshold: self.threshold,
             indirect_threshold: 2.0 * self.threshold,
+            texel: 2.0 * self.threshold,
         };
         solve(&problem, facets, &mut |_| true).expect("nobody cancels")
     }
