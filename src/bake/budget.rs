@@ -90,7 +90,7 @@ pub(super) fn within(maker: &PageMaker, budget: u64, recorder: &mut Recorder) ->
 
 fn bytes_of(maker: &PageMaker, page: &Page, recorder: &mut Recorder) -> Result<u64, Error> {
     enter(recorder, Stage::Export)?;
-    Ok(Written::of(&page.lightmap, maker.options().quantity)?.sum())
+    Ok(Written::of(page, maker.options())?.sum())
 }
 
 /// A page that was made.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cobake::options::{
-    BakeOptions, CobHeight, DensityPolicy, Direct, Quantity, Refine, Resolution, Toggle, Topology,
+    BakeOptions, CobHeight, DensityPolicy, Direct, Preview, Quantity, Refine, Resolution, Toggle, Topology,
 };
 
 use super::bytes;
@@ -76,9 +76,9 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "BYTES", value_parser = bytes::parse, conflicts_with_all = ["size", "texels_per_metre"], help_heading = LIGHTMAP)]
     budget: Option<u64>,
 
-    /// Where texels are dense
-    #[arg(long, value_enum, default_value_t = DensityWord::Light, help_heading = LIGHTMAP)]
-    density: DensityWord,
+    /// Where texels are dense [default: light, or uniform with --preview]
+    #[arg(long, value_enum, help_heading = LIGHTMAP)]
+    density: Option<DensityWord>,
 
     /// Free texels around what a lookup in a chart touches, 1 to 16 [default: 1, or 0 where charts do not fit otherwise]
     #[arg(long, value_name = "TEXELS", help_heading = LIGHTMAP)]
@@ -91,6 +91,10 @@ pub(crate) struct BakeArgs {
     /// What a texel holds
     #[arg(long, value_enum, default_value_t = QuantityWord::Irradiance, help_heading = LIGHTMAP)]
     quantity: QuantityWord,
+
+    /// Show the light in viewers that know no lightmaps: lit materials become pictures of it
+    #[arg(long, value_enum, help_heading = LIGHTMAP)]
+    preview: Option<PreviewWord>,
 
     /// Where a texel's direct light comes from
     #[arg(long, value_enum, default_value_t = DirectWord::Texel, help_heading = LIGHTMAP)]
@@ -196,6 +200,23 @@ enum QuantityWord {
     Radiosity,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PreviewWord {
+    /// Tone-mapped, as the colour of unlit materials
+    Unlit,
+    /// In nits, as the emission of black materials
+    Emissive,
+}
+
+impl From<PreviewWord> for Preview {
+    fn from(word: PreviewWord) -> Self {
+        match word {
+            PreviewWord::Unlit => Self::Unlit,
+            PreviewWord::Emissive => Self::Emissive,
+        }
+    }
+}
+
 impl From<RefineWord> for Refine {
     fn from(word: RefineWord) -> Self {
         match word {
@@ -255,7 +276,13 @@ impl From<&BakeArgs> for BakeOptions {
             (None, Some(bytes)) => Resolution::Bytes(bytes),
             (None, None) => Resolution::Size(args.size),
         };
-        options.density = args.density.into();
+        options.preview = args.preview.map(Preview::from);
+        // A preview's texels show textures as well as light.
+        let density = match args.preview {
+            Some(_) => DensityPolicy::Uniform,
+            None => DensityPolicy::default(),
+        };
+        options.density = args.density.map_or(density, DensityPolicy::from);
         options.threads = args.threads;
         options.refine = args.refine.into();
         options.direct = args.direct.into();
@@ -334,6 +361,14 @@ mod tests {
         assert_eq!(options("--texels-per-metre 40").resolution, Resolution::TexelsPerMetre(40.0));
         assert_eq!(options("--budget 4MiB").resolution, Resolution::Bytes(4 << 20));
         assert_eq!(options("--cob-height-fixed 0.03").cob_height, CobHeight::Metres(0.03));
+    }
+
+    #[test]
+    fn previews_have_texels_of_one_size_unless_told_otherwise() {
+        let unlit = options("--preview unlit");
+        assert_eq!((unlit.preview, unlit.density), (Some(Preview::Unlit), DensityPolicy::Uniform));
+        let light = options("--preview emissive --density light");
+        assert_eq!((light.preview, light.density), (Some(Preview::Emissive), DensityPolicy::Light));
     }
 
     #[test]
