@@ -12,7 +12,11 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 26] = [
+const OPTIONS: [&str; 30] = [
+    "--exr",
+    "--hdr",
+    "--ktx2",
+    "--rgbm",
     "--preview",
     "--output",
     "--budget",
@@ -266,6 +270,23 @@ fn bake_writes_a_glb_and_nothing_else() {
     work.bake(&[]).done();
     assert_eq!(work.names(), ["in.glb", "out.glb"]);
     assert!(std::fs::read(work.path("out.glb")).expect("read").starts_with(b"glTF"));
+}
+
+/// The lightmap's own files hold what the output's EXR holds; none is written where one cannot be.
+#[test]
+fn sidecars_lie_beside_the_output() {
+    let work = Workplace::new();
+    work.bake(&["--exr", "a.exr", "--hdr", "a.hdr", "--ktx2", "a.ktx2", "--rgbm", "a.png"]).done();
+    assert_eq!(work.names(), ["a.exr", "a.hdr", "a.ktx2", "a.png", "in.glb", "out.glb"]);
+    let (exr, glb) = (std::fs::read(work.path("a.exr")).expect("read"), std::fs::read(work.path("out.glb")));
+    assert!(glb.expect("read").windows(exr.len()).any(|window| window == exr), "the same bytes");
+
+    let work = Workplace::new();
+    work.bake(&["--exr", "in.glb"]).refused(2, &["--exr", "replace the input"]);
+    work.bake(&["--hdr", "out.glb"]).refused(2, &["--hdr", "replace the output"]);
+    work.bake(&["--hdr", "a", "--rgbm", "./a"]).refused(2, &["--rgbm", "--hdr"]);
+    work.bake(&["--ktx2", "gone/a.ktx2"]).refused(1, &["gone/a.ktx2", "does not exist"]);
+    assert_eq!(work.names(), ["in.glb"]);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use cobake::options::{
 
 use super::bytes;
 use super::compare_args::CompareArgs;
+use super::sidecars::SidecarArgs;
 
 /// Bakes lightmaps into glTF scenes: radiosity on a mesh that refines itself near close occluders.
 #[derive(Debug, Parser)]
@@ -51,6 +52,9 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
 
+    #[command(flatten)]
+    pub(crate) sidecars: SidecarArgs,
+
     /// Keep stderr empty: no progress, no warnings, no summary; errors still show
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -76,7 +80,7 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "BYTES", value_parser = bytes::parse, conflicts_with_all = ["size", "texels_per_metre"], help_heading = LIGHTMAP)]
     budget: Option<u64>,
 
-    /// Where texels are dense [default: light, or uniform with --preview]
+    /// Where texels are dense [default: light; with a preview uniform]
     #[arg(long, value_enum, help_heading = LIGHTMAP)]
     density: Option<DensityWord>,
 

@@ -3,7 +3,9 @@
 use anyhow::Context;
 use cobake::BakeResult;
 use cobake::error::Error;
-use cobake::export::{self, write_whole};
+use std::path::PathBuf;
+
+use cobake::export::{SidecarForm, file_of, write_all, write_whole};
 use cobake::options::BakeOptions;
 use cobake::picture;
 use cobake::progress::Stage;
@@ -13,17 +15,21 @@ use super::args::BakeArgs;
 use super::files::Files;
 use super::interrupt::Interrupt;
 use super::terminal::{TerminalProgress, Voice};
-use super::{summary, terminal};
+use super::{sidecars, summary, terminal};
 
 /// Runs the command. Nothing is written unless the bake went through.
 pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     let options = BakeOptions::from(args);
     options.validate().map_err(Error::from)?;
+    let wanted = args.sidecars.wanted();
+    let sidecars: Vec<_> =
+        wanted.iter().map(|(form, path)| (sidecars::option(*form), path.clone())).collect();
     let files = Files {
         input: &args.input,
         output: &args.output,
         report: args.report.as_deref(),
         pictures: args.pictures.as_deref(),
+        sidecars: &sidecars,
     };
     files.check()?;
 
@@ -35,7 +41,7 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     if !interrupt.begin_writing() {
         return Err(Error::Cancelled.into());
     }
-    write(&files, &mut result)?;
+    write(&files, &wanted, &mut result)?;
     progress.finish();
 
     if voice == Voice::Normal && terminal::is_watched() {
@@ -44,11 +50,18 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the scene, then the pictures, then the report, which counts what the first took.
-fn write(files: &Files<'_>, result: &mut BakeResult) -> anyhow::Result<()> {
+/// Writes the scene and the lightmap's own files, all or none, then the pictures, then the report, which counts
+/// what the first took.
+fn write(
+    files: &Files<'_>,
+    wanted: &[(SidecarForm, PathBuf)],
+    result: &mut BakeResult,
+) -> anyhow::Result<()> {
     let mut clock = StageClock::start();
     clock.begin(Stage::Export);
-    export::write(files.output, &result.glb).map_err(Error::from)?;
+    let mut set = vec![file_of(files.output, &result.glb).map_err(Error::from)?];
+    set.extend(sidecars::encode(&result.lightmap, wanted)?);
+    write_all(&set).map_err(Error::from)?;
     result.report.time.add(Stage::Export, clock.finish().total);
     result.report.peak_memory_bytes = peak_memory_bytes();
 

@@ -12,6 +12,7 @@ mod failure;
 mod files;
 mod interrupt;
 mod log;
+mod sidecars;
 mod summary;
 mod table;
 mod terminal;

@@ -9,6 +9,8 @@
 //! π, so that it still shows the irradiance; with [`Quantity::Radiosity`] there is no such factor and
 //! the file holds the EXR alone.
 //!
+//! Beside the output the lightmap may lie in files of its own ([`SidecarForm`]).
+//!
 //! With a [`Preview`] lit materials are pictures of the light instead, for viewers that know no lightmaps; the
 //! EXR stays.
 //!
@@ -31,6 +33,7 @@ mod error;
 mod exr;
 mod glb;
 mod interpolation;
+mod ktx2;
 mod layout;
 mod materials;
 mod plan;
@@ -39,6 +42,8 @@ mod pool;
 mod preview;
 mod primitive;
 mod references;
+mod rgbm;
+mod sidecar;
 mod source;
 mod transform;
 mod verify;
@@ -50,8 +55,9 @@ pub use exr::{decode_exr, encode_exr};
 pub(crate) use materials::LIGHTMAP_SET;
 pub use png::{Png, encode_png};
 pub use preview::encode_preview;
+pub use sidecar::{SidecarForm, encode_sidecar};
 pub use verify::{lightmap_bytes, verify};
-pub use write::{write, write_whole};
+pub use write::{WrittenFile, file_of, write, write_all, write_whole};
 pub(crate) use writer::COBAKE_LIGHTMAP;
 
 use crate::options::BakeOptions;

@@ -67,7 +67,7 @@ pub(super) fn scale(lightmap: &Lightmap) -> f32 {
 }
 
 /// The least power of two at or above `value`, held between 2⁻¹²⁶ and 2¹²⁷.
-fn power_of_two_at_least(value: f32) -> f32 {
+pub(super) fn power_of_two_at_least(value: f32) -> f32 {
     (-126..=127).map(|exponent| 2.0_f32.powi(exponent)).find(|&p| p >= value).unwrap_or(2.0_f32.powi(127))
 }
 
