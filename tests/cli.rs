@@ -12,7 +12,8 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 30] = [
+const OPTIONS: [&str; 31] = [
+    "--for",
     "--exr",
     "--hdr",
     "--ktx2",
@@ -287,6 +288,27 @@ fn sidecars_lie_beside_the_output() {
     work.bake(&["--hdr", "a", "--rgbm", "./a"]).refused(2, &["--rgbm", "--hdr"]);
     work.bake(&["--ktx2", "gone/a.ktx2"]).refused(1, &["gone/a.ktx2", "does not exist"]);
     assert_eq!(work.names(), ["in.glb"]);
+}
+
+#[test]
+fn engines_get_their_files() {
+    let work = Workplace::new();
+    work.bake(&["--for", "bevy", "--report", "report.json"]).done();
+    assert_eq!(work.names(), ["in.glb", "out.glb", "out.ktx2", "report.json"]);
+    assert_eq!(work.report()["options"]["quantity"], "radiance");
+
+    let work = Workplace::new();
+    let finished = work.bake(&["--for", "unity", "--quantity", "irradiance", "--exr", "light.exr"]);
+    finished.done();
+    assert!(finished.stderr.contains("unity reads radiance"), "{}", finished.stderr);
+    assert_eq!(work.names(), ["in.glb", "light.exr", "out.glb"]);
+
+    let work = Workplace::new();
+    work.bake(&["--for", "quake"]).refused(2, &["quake", "bevy"]);
+    work.bake(&["--for", "bevy", "--preview", "unlit"]).refused(2, &["--preview"]);
+    std::fs::create_dir(work.path("out.ktx2")).expect("made");
+    work.bake(&["--for", "bevy"]).refused(1, &["out.ktx2", "not a file"]);
+    assert!(!work.path("out.glb").exists());
 }
 
 #[test]

@@ -9,6 +9,7 @@ use cobake::options::{
 
 use super::bytes;
 use super::compare_args::CompareArgs;
+use super::engine::Engine;
 use super::sidecars::SidecarArgs;
 
 /// Bakes lightmaps into glTF scenes: radiosity on a mesh that refines itself near close occluders.
@@ -52,6 +53,10 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
 
+    /// Write what this engine reads: sets what a texel holds, and adds a file named after the output
+    #[arg(long = "for", value_enum, value_name = "ENGINE", conflicts_with = "preview")]
+    pub(crate) engine: Option<Engine>,
+
     #[command(flatten)]
     pub(crate) sidecars: SidecarArgs,
 
@@ -92,9 +97,9 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "LEVELS", default_value_t = BakeOptions::default().mips, help_heading = LIGHTMAP)]
     mips: u32,
 
-    /// What a texel holds
-    #[arg(long, value_enum, default_value_t = QuantityWord::Irradiance, help_heading = LIGHTMAP)]
-    quantity: QuantityWord,
+    /// What a texel holds [default: irradiance, or what --for takes]
+    #[arg(long, value_enum, help_heading = LIGHTMAP)]
+    quantity: Option<QuantityWord>,
 
     /// Show the light in viewers that know no lightmaps: lit materials become pictures of it
     #[arg(long, value_enum, help_heading = LIGHTMAP)]
@@ -270,6 +275,27 @@ impl From<QuantityWord> for Quantity {
     }
 }
 
+impl BakeArgs {
+    /// What of the explicit options is not what the engine reads; the user has the last word.
+    pub(crate) fn doubt(&self) -> Option<String> {
+        let (engine, typed) = (self.engine?, Quantity::from(self.quantity?));
+        let (takes, typed) = (word(engine.quantity()), (word(typed), typed));
+        (typed.1 != engine.quantity()).then(|| {
+            let (name, typed) = (engine.word(), typed.0);
+            format!("--quantity {typed} is written as told, but {name} reads {takes}; leave --quantity out")
+        })
+    }
+}
+
+/// A quantity as it is typed.
+fn word(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Radiance => "radiance",
+        Quantity::Radiosity => "radiosity",
+        _ => "irradiance",
+    }
+}
+
 impl From<&BakeArgs> for BakeOptions {
     /// Says what was typed in the library's words; ranges are checked by [`BakeOptions::validate`].
     fn from(args: &BakeArgs) -> Self {
@@ -291,7 +317,8 @@ impl From<&BakeArgs> for BakeOptions {
         options.refine = args.refine.into();
         options.direct = args.direct.into();
         options.topology = args.topology.into();
-        options.quantity = args.quantity.into();
+        let quantity = args.engine.map_or(Quantity::default(), Engine::quantity);
+        options.quantity = args.quantity.map_or(quantity, Quantity::from);
         options.cob_height =
             args.cob_height_fixed.map_or(CobHeight::OfElement(args.cob_height), CobHeight::Metres);
         options.subdivision_threshold = args.subdivision_threshold;
@@ -365,6 +392,13 @@ mod tests {
         assert_eq!(options("--texels-per-metre 40").resolution, Resolution::TexelsPerMetre(40.0));
         assert_eq!(options("--budget 4MiB").resolution, Resolution::Bytes(4 << 20));
         assert_eq!(options("--cob-height-fixed 0.03").cob_height, CobHeight::Metres(0.03));
+    }
+
+    #[test]
+    fn engines_set_the_quantity_and_explicit_options_win() {
+        assert_eq!(options("--for bevy").quantity, Quantity::Radiance);
+        assert_eq!(options("--for three").quantity, Quantity::Irradiance);
+        assert_eq!(options("--for unity --quantity irradiance").quantity, Quantity::Irradiance);
     }
 
     #[test]

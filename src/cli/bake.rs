@@ -21,7 +21,7 @@ use super::{sidecars, summary, terminal};
 pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     let options = BakeOptions::from(args);
     options.validate().map_err(Error::from)?;
-    let wanted = args.sidecars.wanted();
+    let wanted = args.sidecars.wanted(args.engine.and_then(|engine| engine.sidecar(&args.output)));
     let sidecars: Vec<_> =
         wanted.iter().map(|(form, path)| (sidecars::option(*form), path.clone())).collect();
     let files = Files {
@@ -34,6 +34,9 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     files.check()?;
 
     let voice = if args.quiet { Voice::Quiet } else { Voice::Normal };
+    if let (Some(doubt), Voice::Normal) = (args.doubt(), voice) {
+        terminal::say(&format!("warning: {doubt}"));
+    }
     let interrupt = Interrupt::watch()?;
     let mut progress = TerminalProgress::new(voice, interrupt.clone());
     let mut result = cobake::bake(files.input, &options, &mut progress)

@@ -8,6 +8,7 @@ mod bake;
 mod bytes;
 mod compare;
 mod compare_args;
+mod engine;
 mod failure;
 mod files;
 mod interrupt;

@@ -40,15 +40,18 @@ pub(crate) fn option(form: SidecarForm) -> &'static str {
 }
 
 impl SidecarArgs {
-    /// What was asked for, and where it goes.
-    pub(crate) fn wanted(&self) -> Vec<(SidecarForm, PathBuf)> {
+    /// What was asked for, and where it goes; an engine's file goes where its form was asked for, if it was.
+    pub(crate) fn wanted(&self, engine: Option<(SidecarForm, PathBuf)>) -> Vec<(SidecarForm, PathBuf)> {
         let all = [
             (SidecarForm::Exr, &self.exr),
             (SidecarForm::Hdr, &self.hdr),
             (SidecarForm::Ktx2, &self.ktx2),
             (SidecarForm::Rgbm, &self.rgbm),
         ];
-        all.into_iter().filter_map(|(form, path)| Some((form, path.clone()?))).collect()
+        let typed = all.into_iter().filter_map(|(form, path)| Some((form, path.clone()?)));
+        let mut wanted: Vec<_> = typed.collect();
+        wanted.extend(engine.filter(|(form, _)| wanted.iter().all(|(typed, _)| typed != form)));
+        wanted
     }
 }
 
