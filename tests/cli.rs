@@ -12,7 +12,8 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 31] = [
+const OPTIONS: [&str; 32] = [
+    "--separate",
     "--for",
     "--exr",
     "--hdr",
@@ -309,6 +310,35 @@ fn engines_get_their_files() {
     std::fs::create_dir(work.path("out.ktx2")).expect("made");
     work.bake(&["--for", "bevy"]).refused(1, &["out.ktx2", "not a file"]);
     assert!(!work.path("out.glb").exists());
+}
+
+/// Text, buffer and images are the GLB in several files; and no file that the input uses is written over.
+#[test]
+fn separate_files_are_the_same_scene() {
+    let work = Workplace::new();
+    work.bake(&[]).done();
+    let bake = |input: &str, output: &str, words: &[&str]| {
+        work.run(&[&["bake", input, "-o", output], &SMALL[..], words].concat())
+    };
+    bake("in.glb", "a b.gltf", &["--separate"]).done();
+    let names = ["a b-lightmap0.png", "a b.bin", "a b.gltf", "in.glb", "out.glb"];
+    assert_eq!(work.names(), names);
+    let compared = work.run(&["compare", "out.glb", "a b.gltf", "--fail-above", "0.000001"]);
+    assert_eq!(compared.code, Some(0), "{}", compared.stderr);
+    let (text, _, pictures) = gltf::import(work.path("a b.gltf")).expect("read");
+    let (glb, _, same) = gltf::import(work.path("out.glb")).expect("read");
+    assert_eq!(pictures[0].pixels, same[0].pixels);
+    assert_eq!(text.views().count() + 1, glb.views().count(), "the picture has left the buffer");
+
+    bake("a b.gltf", "a b.glb", &["--exr", "a b.bin"]).refused(2, &["--exr", "input's file", "a b.bin"]);
+    bake("a b.gltf", "a b.gltf", &["--separate"]).refused(2, &["replace the input"]);
+    bake("in.glb", "x.glb", &["--separate"]).refused(2, &["--separate", ".gltf"]);
+    bake("in.glb", "x.gltf", &["--separate", "--exr", "x.bin"]).refused(2, &["-o", "--exr"]);
+    assert_eq!(work.names(), names);
+
+    // Of another folder's file of the same name, or an older bake's, there is nothing to fear.
+    bake("a b.gltf", "c.gltf", &["--separate"]).done();
+    assert!(work.path("c.bin").is_file() && work.path("c-lightmap0.png").is_file());
 }
 
 #[test]

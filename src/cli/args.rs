@@ -40,9 +40,13 @@ pub(crate) struct BakeArgs {
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
 
-    /// Where the lightmapped scene goes: a .glb file, or a .gltf one that holds everything in itself
+    /// Where the lightmapped scene goes: a .glb file, or a .gltf one
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
+
+    /// Write buffer and images of a .gltf output into files beside it, named after it
+    #[arg(long)]
+    pub(crate) separate: bool,
 
     /// Write what was done and what it cost, as JSON
     #[arg(long, value_name = "FILE.json")]

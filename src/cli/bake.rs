@@ -5,13 +5,16 @@ use cobake::BakeResult;
 use cobake::error::Error;
 use std::path::PathBuf;
 
-use cobake::export::{SidecarForm, file_of, write_all, write_whole};
+use cobake::export::{
+    SidecarForm, WrittenFile, buffer_beside, file_of, referenced_files, separate, write_all, write_whole,
+};
 use cobake::options::BakeOptions;
 use cobake::picture;
 use cobake::progress::Stage;
 use cobake::report::{StageClock, peak_memory_bytes};
 
 use super::args::BakeArgs;
+use super::failure::WrongUse;
 use super::files::Files;
 use super::interrupt::Interrupt;
 use super::terminal::{TerminalProgress, Voice};
@@ -22,8 +25,15 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     let options = BakeOptions::from(args);
     options.validate().map_err(Error::from)?;
     let wanted = args.sidecars.wanted(args.engine.and_then(|engine| engine.sidecar(&args.output)));
-    let sidecars: Vec<_> =
+    let mut sidecars: Vec<_> =
         wanted.iter().map(|(form, path)| (sidecars::option(*form), path.clone())).collect();
+    if args.separate {
+        if !args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf")) {
+            let message = "--separate is for glTF text; let the name of -o end in .gltf, or leave it out";
+            return Err(WrongUse(message.to_owned()).into());
+        }
+        sidecars.push(("-o", buffer_beside(&args.output)));
+    }
     let files = Files {
         input: &args.input,
         output: &args.output,
@@ -44,7 +54,7 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     if !interrupt.begin_writing() {
         return Err(Error::Cancelled.into());
     }
-    write(&files, &wanted, &mut result)?;
+    write(args, (&files, &wanted), &mut result)?;
     progress.finish();
 
     if voice == Voice::Normal && terminal::is_watched() {
@@ -56,13 +66,13 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
 /// Writes the scene and the lightmap's own files, all or none, then the pictures, then the report, which counts
 /// what the first took.
 fn write(
-    files: &Files<'_>,
-    wanted: &[(SidecarForm, PathBuf)],
+    args: &BakeArgs,
+    (files, wanted): (&Files<'_>, &[(SidecarForm, PathBuf)]),
     result: &mut BakeResult,
 ) -> anyhow::Result<()> {
     let mut clock = StageClock::start();
     clock.begin(Stage::Export);
-    let mut set = vec![file_of(files.output, &result.glb).map_err(Error::from)?];
+    let mut set = scene_files(args, files, &result.glb)?;
     set.extend(sidecars::encode(&result.lightmap, wanted)?);
     write_all(&set).map_err(Error::from)?;
     result.report.time.add(Stage::Export, clock.finish().total);
@@ -87,4 +97,16 @@ fn write(
         write_whole(path, json.as_bytes()).map_err(Error::from)?;
     }
     Ok(())
+}
+
+/// The output, in one file or in several.
+fn scene_files(args: &BakeArgs, files: &Files<'_>, glb: &[u8]) -> anyhow::Result<Vec<WrittenFile>> {
+    if !args.separate {
+        return Ok(vec![file_of(files.output, glb).map_err(Error::from)?]);
+    }
+    let mut taken = referenced_files(files.input);
+    taken.push(files.input.into());
+    taken.extend(files.report.map(PathBuf::from));
+    taken.extend(files.sidecars.iter().map(|(_, path)| path.clone()));
+    Ok(separate(files.output, glb, &taken).map_err(Error::from)?)
 }

@@ -6,6 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use cobake::export::referenced_files;
 use tempfile::NamedTempFile;
 
 use super::failure::WrongUse;
@@ -51,6 +52,8 @@ impl Files<'_> {
 
     fn check_distinct(&self) -> anyhow::Result<()> {
         let mut known = vec![("input".to_owned(), identity(self.input))];
+        let used = referenced_files(self.input);
+        known.extend(used.iter().map(|file| (format!("input's file {}", file.display()), identity(file))));
         for (name, option, path) in self.results() {
             let identity = identity(path);
             if let Some((other, _)) = known.iter().find(|(_, known)| *known == identity) {
