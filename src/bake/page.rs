@@ -98,10 +98,11 @@ impl<'a> PageMaker<'a> {
         enter(recorder, Stage::Raster)?;
         let Rasterized { mut lightmap, mut preview, counts: mut texels } = rasterize(self.lighting, &atlas);
         if self.options.mips > 0 {
-            let fill =
-                |page: &mut Lightmap| fill_cells(page, self.lighting.surfaces(), &atlas, self.options.mips);
-            texels.dilated = fill(&mut lightmap);
-            preview.as_mut().map(fill);
+            let (surfaces, mips) = (self.lighting.surfaces(), self.options.mips);
+            texels.dilated = fill_cells(&mut lightmap, surfaces, &atlas, mips);
+            if let Some(preview) = &mut preview {
+                fill_cells(preview, surfaces, &atlas, mips);
+            }
         }
         Ok(Page { atlas, lightmap, preview, texels })
     }

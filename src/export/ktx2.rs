@@ -63,7 +63,7 @@ fn packed(texel: [f32; 3]) -> u32 {
     // The least exponent whose mantissa has room for the largest channel, rounded.
     let exponent = (0..31).find(|&e| (largest / step(e)).round() < 512.0).unwrap_or(31);
     let [r, g, b] = channels.map(|c| (c / step(exponent)).round() as u32);
-    r | g << 9 | b << 18 | (exponent as u32) << 27
+    r | (g << 9) | (b << 18) | ((exponent as u32) << 27)
 }
 
 fn step(exponent: i32) -> f64 {
@@ -76,12 +76,12 @@ fn descriptor() -> Vec<u8> {
     const BLOCK: u32 = 24 + 16 * SAMPLES;
     const EXPONENT: u32 = 0x20;
     /// RGBSDA, Rec. 709 primaries, linear, straight alpha.
-    const MODEL: u32 = 1 | 1 << 8 | 1 << 16;
-    let mut words = vec![4 + BLOCK, 0, 2 | BLOCK << 16, MODEL, 0, 4, 0];
+    const MODEL: u32 = 1 | (1 << 8) | (1 << 16);
+    let mut words = vec![4 + BLOCK, 0, 2 | (BLOCK << 16), MODEL, 0, 4, 0];
     for channel in 0..3 {
         // First bit, bits less one and kind; position; least and greatest value.
-        words.extend([9 * channel | 8 << 16 | channel << 24, 0, 0, 8448]);
-        words.extend([27 | 4 << 16 | (channel | EXPONENT) << 24, 0, 15, 31]);
+        words.extend([(9 * channel) | (8 << 16) | (channel << 24), 0, 0, 8448]);
+        words.extend([27 | (4 << 16) | ((channel | EXPONENT) << 24), 0, 15, 31]);
     }
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
@@ -104,9 +104,9 @@ mod tests {
     #[test]
     fn texels_are_packed_as_the_extension_says() {
         assert_eq!(packed([0.0; 3]), 0);
-        assert_eq!(packed([1.0, 0.5, 0.25]), 256 | 128 << 9 | 64 << 18 | 16 << 27);
-        assert_eq!(packed([511.6 * 2.0_f32.powi(-24), 0.0, 0.0]), 256 | 1 << 27);
-        assert_eq!(packed([1e9, -1.0, 0.0]), 511 | 31 << 27);
-        assert_eq!(packed([65408.0, 128.0, 64.0]), 511 | 1 << 9 | 1 << 18 | 31 << 27);
+        assert_eq!(packed([1.0, 0.5, 0.25]), 256 | (128 << 9) | (64 << 18) | (16 << 27));
+        assert_eq!(packed([511.6 * 2.0_f32.powi(-24), 0.0, 0.0]), 256 | (1 << 27));
+        assert_eq!(packed([1e9, -1.0, 0.0]), 511 | (31 << 27));
+        assert_eq!(packed([65408.0, 128.0, 64.0]), 511 | (1 << 9) | (1 << 18) | (31 << 27));
     }
 }
