@@ -143,7 +143,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         options,
     };
     let lighting = Lighting::new(&raster_input);
-    let Page { atlas, lightmap, texels } =
+    let Page { atlas, lightmap, preview, texels } =
         PageMaker::new(&lighting, options, scale.texel, weights).page(&mut recorder)?;
 
     enter(&mut recorder, Stage::Export)?;
@@ -152,6 +152,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         surfaces: &surfaces,
         atlas: &atlas,
         lightmap: &lightmap,
+        preview: preview.as_ref(),
         mesh: &mesh,
         options,
     })?;

@@ -61,6 +61,18 @@ pub enum Quantity {
     Radiosity,
 }
 
+/// What viewers that know no lightmaps are shown in place of the scene's materials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Preview {
+    /// `L + ρ E / π`, tone-mapped, as the colour of unlit materials: looks the same in every viewer.
+    Unlit,
+    /// `L + ρ E / π` as the emission of black materials, nits: brighter than white stays brighter, and the
+    /// viewer's own exposure applies.
+    Emissive,
+}
+
 /// How fine the lightmap is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -131,6 +143,9 @@ pub struct BakeOptions {
     pub topology: Topology,
     /// What a texel holds. Default: [`Quantity::Irradiance`].
     pub quantity: Quantity,
+    /// Whether lit materials become pictures of the light for viewers that know no lightmaps. The page then holds
+    /// what the materials' textures show, so [`DensityPolicy::Uniform`] suits it. Default: none.
+    pub preview: Option<Preview>,
     /// Height of the Close Objects Buffer's prism. Default: the element's size.
     pub cob_height: CobHeight,
     /// Elements no larger than this are not split, metres, above 0. Default: what the lightmap can show.
@@ -184,6 +199,7 @@ impl Default for BakeOptions {
             direct: Direct::default(),
             topology: Topology::default(),
             quantity: Quantity::default(),
+            preview: None,
             cob_height: CobHeight::default(),
             subdivision_threshold: None,
             illumination_threshold: 0.3,

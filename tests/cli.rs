@@ -12,7 +12,14 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 25] = [
+const OPTIONS: [&str; 32] = [
+    "--separate",
+    "--for",
+    "--exr",
+    "--hdr",
+    "--ktx2",
+    "--rgbm",
+    "--preview",
     "--output",
     "--budget",
     "--size",
@@ -265,6 +272,73 @@ fn bake_writes_a_glb_and_nothing_else() {
     work.bake(&[]).done();
     assert_eq!(work.names(), ["in.glb", "out.glb"]);
     assert!(std::fs::read(work.path("out.glb")).expect("read").starts_with(b"glTF"));
+}
+
+/// The lightmap's own files hold what the output's EXR holds; none is written where one cannot be.
+#[test]
+fn sidecars_lie_beside_the_output() {
+    let work = Workplace::new();
+    work.bake(&["--exr", "a.exr", "--hdr", "a.hdr", "--ktx2", "a.ktx2", "--rgbm", "a.png"]).done();
+    assert_eq!(work.names(), ["a.exr", "a.hdr", "a.ktx2", "a.png", "in.glb", "out.glb"]);
+    let (exr, glb) = (std::fs::read(work.path("a.exr")).expect("read"), std::fs::read(work.path("out.glb")));
+    assert!(glb.expect("read").windows(exr.len()).any(|window| window == exr), "the same bytes");
+
+    let work = Workplace::new();
+    work.bake(&["--exr", "in.glb"]).refused(2, &["--exr", "replace the input"]);
+    work.bake(&["--hdr", "out.glb"]).refused(2, &["--hdr", "replace the output"]);
+    work.bake(&["--hdr", "a", "--rgbm", "./a"]).refused(2, &["--rgbm", "--hdr"]);
+    work.bake(&["--ktx2", "gone/a.ktx2"]).refused(1, &["gone/a.ktx2", "does not exist"]);
+    assert_eq!(work.names(), ["in.glb"]);
+}
+
+#[test]
+fn engines_get_their_files() {
+    let work = Workplace::new();
+    work.bake(&["--for", "bevy", "--report", "report.json"]).done();
+    assert_eq!(work.names(), ["in.glb", "out.glb", "out.ktx2", "report.json"]);
+    assert_eq!(work.report()["options"]["quantity"], "radiance");
+
+    let work = Workplace::new();
+    let finished = work.bake(&["--for", "unity", "--quantity", "irradiance", "--exr", "light.exr"]);
+    finished.done();
+    assert!(finished.stderr.contains("unity reads radiance"), "{}", finished.stderr);
+    assert_eq!(work.names(), ["in.glb", "light.exr", "out.glb"]);
+
+    let work = Workplace::new();
+    work.bake(&["--for", "quake"]).refused(2, &["quake", "bevy"]);
+    work.bake(&["--for", "bevy", "--preview", "unlit"]).refused(2, &["--preview"]);
+    std::fs::create_dir(work.path("out.ktx2")).expect("made");
+    work.bake(&["--for", "bevy"]).refused(1, &["out.ktx2", "not a file"]);
+    assert!(!work.path("out.glb").exists());
+}
+
+/// Text, buffer and images are the GLB in several files; and no file that the input uses is written over.
+#[test]
+fn separate_files_are_the_same_scene() {
+    let work = Workplace::new();
+    work.bake(&[]).done();
+    let bake = |input: &str, output: &str, words: &[&str]| {
+        work.run(&[&["bake", input, "-o", output], &SMALL[..], words].concat())
+    };
+    bake("in.glb", "a b.gltf", &["--separate"]).done();
+    let names = ["a b-lightmap0.png", "a b.bin", "a b.gltf", "in.glb", "out.glb"];
+    assert_eq!(work.names(), names);
+    let compared = work.run(&["compare", "out.glb", "a b.gltf", "--fail-above", "0.000001"]);
+    assert_eq!(compared.code, Some(0), "{}", compared.stderr);
+    let (text, _, pictures) = gltf::import(work.path("a b.gltf")).expect("read");
+    let (glb, _, same) = gltf::import(work.path("out.glb")).expect("read");
+    assert_eq!(pictures[0].pixels, same[0].pixels);
+    assert_eq!(text.views().count() + 1, glb.views().count(), "the picture has left the buffer");
+
+    bake("a b.gltf", "a b.glb", &["--exr", "a b.bin"]).refused(2, &["--exr", "input's file", "a b.bin"]);
+    bake("a b.gltf", "a b.gltf", &["--separate"]).refused(2, &["replace the input"]);
+    bake("in.glb", "x.glb", &["--separate"]).refused(2, &["--separate", ".gltf"]);
+    bake("in.glb", "x.gltf", &["--separate", "--exr", "x.bin"]).refused(2, &["-o", "--exr"]);
+    assert_eq!(work.names(), names);
+
+    // Of another folder's file of the same name, or an older bake's, there is nothing to fear.
+    bake("a b.gltf", "c.gltf", &["--separate"]).done();
+    assert!(work.path("c.bin").is_file() && work.path("c-lightmap0.png").is_file());
 }
 
 #[test]

@@ -106,7 +106,7 @@ fn search(
 
 fn bytes_of(maker: &PageMaker, page: &Page, recorder: &mut Recorder) -> Result<u64, Error> {
     enter(recorder, Stage::Export)?;
-    Ok(Written::of(&page.lightmap, maker.options().quantity)?.sum())
+    Ok(Written::of(page, maker.options())?.sum())
 }
 
 /// A page that was made.

@@ -4,7 +4,7 @@ use crate::density::{DensityOptions, LightSurvey};
 use crate::error::Error;
 use crate::options::{BakeOptions, DensityPolicy, Resolution};
 use crate::progress::Stage;
-use crate::raster::{Lighting, Lightmap, TexelCounts, rasterize};
+use crate::raster::{Lighting, Lightmap, Rasterized, TexelCounts, rasterize};
 use crate::report::Recorder;
 use crate::surface::Surface;
 use crate::unwrap::{
@@ -32,6 +32,8 @@ const LONGEST: f64 = 1.5;
 pub(super) struct Page {
     pub(super) atlas: Atlas,
     pub(super) lightmap: Lightmap,
+    /// What the surfaces send out, where the options ask for a preview.
+    pub(super) preview: Option<Lightmap>,
     pub(super) texels: TexelCounts,
 }
 
@@ -98,12 +100,15 @@ impl<'a> PageMaker<'a> {
 
     fn paint(&self, atlas: Atlas, recorder: &mut Recorder) -> Result<Page, Error> {
         enter(recorder, Stage::Raster)?;
-        let (mut lightmap, mut texels) = rasterize(self.lighting, &atlas);
+        let Rasterized { mut lightmap, mut preview, counts: mut texels } = rasterize(self.lighting, &atlas);
         if self.options.mips > 0 {
-            let filled = fill_cells(&mut lightmap, self.lighting.surfaces(), &atlas, self.options.mips);
-            texels.dilated = filled;
+            let (surfaces, mips) = (self.lighting.surfaces(), self.options.mips);
+            texels.dilated = fill_cells(&mut lightmap, surfaces, &atlas, mips);
+            if let Some(preview) = &mut preview {
+                fill_cells(preview, surfaces, &atlas, mips);
+            }
         }
-        Ok(Page { atlas, lightmap, texels })
+        Ok(Page { atlas, lightmap, preview, texels })
     }
 
     /// How large the page becomes, or about how large.

@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cobake::options::{
-    BakeOptions, CobHeight, DensityPolicy, Direct, Quantity, Refine, Resolution, Toggle, Topology,
+    BakeOptions, CobHeight, DensityPolicy, Direct, Preview, Quantity, Refine, Resolution, Toggle, Topology,
 };
 
 use super::bytes;
 use super::compare_args::CompareArgs;
+use super::engine::Engine;
+use super::sidecars::SidecarArgs;
 
 /// Bakes lightmaps into glTF scenes: radiosity on a mesh that refines itself near close occluders.
 #[derive(Debug, Parser)]
@@ -38,9 +40,13 @@ pub(crate) struct BakeArgs {
     #[arg(value_name = "IN")]
     pub(crate) input: PathBuf,
 
-    /// Where the lightmapped scene goes: a .glb file, or a .gltf one that holds everything in itself
+    /// Where the lightmapped scene goes: a .glb file, or a .gltf one
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
+
+    /// Write buffer and images of a .gltf output into files beside it, named after it
+    #[arg(long)]
+    pub(crate) separate: bool,
 
     /// Write what was done and what it cost, as JSON
     #[arg(long, value_name = "FILE.json")]
@@ -50,6 +56,13 @@ pub(crate) struct BakeArgs {
     /// if there is none
     #[arg(long, value_name = "DIR")]
     pub(crate) pictures: Option<PathBuf>,
+
+    /// Write what this engine reads: sets what a texel holds, and adds a file named after the output
+    #[arg(long = "for", value_enum, value_name = "ENGINE", conflicts_with = "preview")]
+    pub(crate) engine: Option<Engine>,
+
+    #[command(flatten)]
+    pub(crate) sidecars: SidecarArgs,
 
     /// Keep stderr empty: no progress, no warnings, no summary; errors still show
     #[arg(short, long)]
@@ -76,9 +89,9 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "BYTES", value_parser = bytes::parse, conflicts_with_all = ["size", "texels_per_metre"], help_heading = LIGHTMAP)]
     budget: Option<u64>,
 
-    /// Where texels are dense
-    #[arg(long, value_enum, default_value_t = DensityWord::Light, help_heading = LIGHTMAP)]
-    density: DensityWord,
+    /// Where texels are dense [default: light; with a preview uniform]
+    #[arg(long, value_enum, help_heading = LIGHTMAP)]
+    density: Option<DensityWord>,
 
     /// Free texels around what a lookup in a chart touches, 1 to 16 [default: 1, or 0 where charts do not fit otherwise]
     #[arg(long, value_name = "TEXELS", help_heading = LIGHTMAP)]
@@ -88,9 +101,13 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "LEVELS", default_value_t = BakeOptions::default().mips, help_heading = LIGHTMAP)]
     mips: u32,
 
-    /// What a texel holds
-    #[arg(long, value_enum, default_value_t = QuantityWord::Irradiance, help_heading = LIGHTMAP)]
-    quantity: QuantityWord,
+    /// What a texel holds [default: irradiance, or what --for takes]
+    #[arg(long, value_enum, help_heading = LIGHTMAP)]
+    quantity: Option<QuantityWord>,
+
+    /// Show the light in viewers that know no lightmaps: lit materials become pictures of it
+    #[arg(long, value_enum, help_heading = LIGHTMAP)]
+    preview: Option<PreviewWord>,
 
     /// Where a texel's direct light comes from
     #[arg(long, value_enum, default_value_t = DirectWord::Texel, help_heading = LIGHTMAP)]
@@ -196,6 +213,23 @@ enum QuantityWord {
     Radiosity,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PreviewWord {
+    /// Tone-mapped, as the colour of unlit materials
+    Unlit,
+    /// In nits, as the emission of black materials
+    Emissive,
+}
+
+impl From<PreviewWord> for Preview {
+    fn from(word: PreviewWord) -> Self {
+        match word {
+            PreviewWord::Unlit => Self::Unlit,
+            PreviewWord::Emissive => Self::Emissive,
+        }
+    }
+}
+
 impl From<RefineWord> for Refine {
     fn from(word: RefineWord) -> Self {
         match word {
@@ -245,6 +279,27 @@ impl From<QuantityWord> for Quantity {
     }
 }
 
+impl BakeArgs {
+    /// What of the explicit options is not what the engine reads; the user has the last word.
+    pub(crate) fn doubt(&self) -> Option<String> {
+        let (engine, typed) = (self.engine?, Quantity::from(self.quantity?));
+        let (takes, typed) = (word(engine.quantity()), (word(typed), typed));
+        (typed.1 != engine.quantity()).then(|| {
+            let (name, typed) = (engine.word(), typed.0);
+            format!("--quantity {typed} is written as told, but {name} reads {takes}; leave --quantity out")
+        })
+    }
+}
+
+/// A quantity as it is typed.
+fn word(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Radiance => "radiance",
+        Quantity::Radiosity => "radiosity",
+        _ => "irradiance",
+    }
+}
+
 impl From<&BakeArgs> for BakeOptions {
     /// Says what was typed in the library's words; ranges are checked by [`BakeOptions::validate`].
     fn from(args: &BakeArgs) -> Self {
@@ -255,12 +310,19 @@ impl From<&BakeArgs> for BakeOptions {
             (None, Some(bytes)) => Resolution::Bytes(bytes),
             (None, None) => Resolution::Size(args.size),
         };
-        options.density = args.density.into();
+        options.preview = args.preview.map(Preview::from);
+        // A preview's texels show textures as well as light.
+        let density = match args.preview {
+            Some(_) => DensityPolicy::Uniform,
+            None => DensityPolicy::default(),
+        };
+        options.density = args.density.map_or(density, DensityPolicy::from);
         options.threads = args.threads;
         options.refine = args.refine.into();
         options.direct = args.direct.into();
         options.topology = args.topology.into();
-        options.quantity = args.quantity.into();
+        let quantity = args.engine.map_or(Quantity::default(), Engine::quantity);
+        options.quantity = args.quantity.map_or(quantity, Quantity::from);
         options.cob_height =
             args.cob_height_fixed.map_or(CobHeight::OfElement(args.cob_height), CobHeight::Metres);
         options.subdivision_threshold = args.subdivision_threshold;
@@ -334,6 +396,21 @@ mod tests {
         assert_eq!(options("--texels-per-metre 40").resolution, Resolution::TexelsPerMetre(40.0));
         assert_eq!(options("--budget 4MiB").resolution, Resolution::Bytes(4 << 20));
         assert_eq!(options("--cob-height-fixed 0.03").cob_height, CobHeight::Metres(0.03));
+    }
+
+    #[test]
+    fn engines_set_the_quantity_and_explicit_options_win() {
+        assert_eq!(options("--for bevy").quantity, Quantity::Radiance);
+        assert_eq!(options("--for three").quantity, Quantity::Irradiance);
+        assert_eq!(options("--for unity --quantity irradiance").quantity, Quantity::Irradiance);
+    }
+
+    #[test]
+    fn previews_have_texels_of_one_size_unless_told_otherwise() {
+        let unlit = options("--preview unlit");
+        assert_eq!((unlit.preview, unlit.density), (Some(Preview::Unlit), DensityPolicy::Uniform));
+        let light = options("--preview emissive --density light");
+        assert_eq!((light.preview, light.density), (Some(Preview::Emissive), DensityPolicy::Light));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use cobake::export::referenced_files;
 use tempfile::NamedTempFile;
 
 use super::failure::WrongUse;
@@ -21,6 +22,8 @@ pub(crate) struct Files<'a> {
     pub(crate) report: Option<&'a Path>,
     /// The folder into which pictures are written.
     pub(crate) pictures: Option<&'a Path>,
+    /// The lightmap's own files: the option that asks for each, and its place.
+    pub(crate) sidecars: &'a [(&'static str, PathBuf)],
 }
 
 impl Files<'_> {
@@ -32,22 +35,34 @@ impl Files<'_> {
         self.check_distinct()?;
         check_input(self.input)?;
         check_target(self.output)?;
+        self.sidecars.iter().try_for_each(|(_, path)| check_target(path))?;
         self.report.map_or(Ok(()), check_target)?;
         self.pictures.map_or(Ok(()), check_picture_folder)
     }
 
+    /// Every result by the name and the option that the user knows it by.
+    fn results(&self) -> Vec<(String, &'static str, &Path)> {
+        let mut results = vec![("output".to_owned(), "-o", self.output)];
+        results.extend(self.report.map(|path| ("report".to_owned(), "--report", path)));
+        for (option, path) in self.sidecars {
+            results.push((format!("file of {option}"), *option, path));
+        }
+        results
+    }
+
     fn check_distinct(&self) -> anyhow::Result<()> {
-        let same = |a: &Path, b: &Path| identity(a) == identity(b);
-        let message = if same(self.input, self.output) {
-            "the output would replace the input; give -o another name"
-        } else if self.report.is_some_and(|report| same(self.input, report)) {
-            "the report would replace the input; give --report another name"
-        } else if self.report.is_some_and(|report| same(self.output, report)) {
-            "the report would replace the output; give --report another name"
-        } else {
-            return Ok(());
-        };
-        Err(WrongUse(message.to_owned()).into())
+        let mut known = vec![("input".to_owned(), identity(self.input))];
+        let used = referenced_files(self.input);
+        known.extend(used.iter().map(|file| (format!("input's file {}", file.display()), identity(file))));
+        for (name, option, path) in self.results() {
+            let identity = identity(path);
+            if let Some((other, _)) = known.iter().find(|(_, known)| *known == identity) {
+                let message = format!("the {name} would replace the {other}; give {option} another name");
+                return Err(WrongUse(message).into());
+            }
+            known.push((name, identity));
+        }
+        Ok(())
     }
 }
 
@@ -133,12 +148,18 @@ mod tests {
         fs::write(&input, b"glTF").expect("written");
         fs::create_dir(folder.path().join("sub")).expect("made");
 
-        let good = Files { input: &input, output: &output, report: None, pictures: None };
+        let good = Files { input: &input, output: &output, report: None, pictures: None, sidecars: &[] };
         good.check().expect("nothing wrong");
         assert!(is_wrong_use(&Files { output: &input, ..good }));
         assert!(is_wrong_use(&Files { output: &detour, ..good }));
         assert!(is_wrong_use(&Files { report: Some(&input), ..good }));
         assert!(is_wrong_use(&Files { report: Some(&output), ..good }));
+        let sidecar = |path: &Path| vec![("--exr", path.to_owned())];
+        for taken in [&input, &detour, &output] {
+            assert!(is_wrong_use(&Files { sidecars: &sidecar(taken), ..good }));
+        }
+        let twice = [sidecar(&folder.path().join("a")), sidecar(&folder.path().join("a"))].concat();
+        assert!(is_wrong_use(&Files { sidecars: &twice, ..good }));
         assert_eq!(fs::read(&input).expect("still there"), b"glTF");
     }
 
@@ -148,7 +169,8 @@ mod tests {
         let input = folder.path().join("in.glb");
         fs::write(&input, b"glTF").expect("written");
         let (output, pictures) = (folder.path().join("out.glb"), folder.path().join("a").join("b"));
-        let files = Files { input: &input, output: &output, report: None, pictures: Some(&pictures) };
+        let files =
+            Files { input: &input, output: &output, report: None, pictures: Some(&pictures), sidecars: &[] };
         files.check().expect("nothing wrong");
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
     }
@@ -159,7 +181,7 @@ mod tests {
         let input = folder.path().join("in.glb");
         fs::write(&input, b"glTF").expect("written");
         let output = input.join("out.glb");
-        let good = Files { input: &input, output: &output, report: None, pictures: None };
+        let good = Files { input: &input, output: &output, report: None, pictures: None, sidecars: &[] };
         assert!(good.check().is_err());
         let inside = folder.path().join("out.glb");
         assert!(Files { output: &inside, pictures: Some(&input), ..good }.check().is_err());

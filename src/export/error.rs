@@ -60,6 +60,20 @@ pub enum ExportError {
         source: image::ImageError,
     },
 
+    /// The Radiance file could not be made.
+    #[error("cannot encode the lightmap as Radiance HDR; please report the scene")]
+    Hdr {
+        /// What the image library reported.
+        source: image::ImageError,
+    },
+
+    /// The PNG with a multiplier could not be made.
+    #[error("cannot encode the lightmap as RGBM; please report the scene")]
+    Rgbm {
+        /// What the PNG library reported.
+        source: ::png::EncodingError,
+    },
+
     /// Something in the source document is not as glTF demands.
     #[error("{list} {index} {problem}; export the scene anew or repair it with a glTF editor")]
     Malformed {

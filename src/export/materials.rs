@@ -10,6 +10,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use super::document::{Document, Object, edit_object, index_of};
+use super::preview;
+use crate::options::Preview;
 
 /// The deployed extension that puts a lightmap on a material.
 const MOZ_LIGHTMAP: &str = "MOZ_lightmap";
@@ -17,13 +19,15 @@ const MOZ_LIGHTMAP: &str = "MOZ_lightmap";
 /// The set that lightmap coordinates live in: loaders have it hard-coded.
 pub(crate) const LIGHTMAP_SET: usize = 1;
 
-/// What `MOZ_lightmap` will refer to.
+/// What lit materials will refer to.
 #[derive(Clone, Debug)]
 pub(super) struct LightmapImage {
     /// The PNG file.
     pub(super) png: Vec<u8>,
-    /// What a stored 255 stands for, as irradiance.
+    /// What a stored 255 stands for: irradiance, or in a preview radiance.
     pub(super) intensity: f64,
+    /// Whether it is a preview that takes the material's place, or else what `MOZ_lightmap` refers to.
+    pub(super) preview: Option<Preview>,
 }
 
 /// The variants made so far.
@@ -80,6 +84,11 @@ impl Materials {
         made
     }
 
+    /// Whether lit primitives show the light as the colour of unlit materials.
+    pub(super) fn are_unlit_previews(&self) -> bool {
+        self.image.as_ref().is_some_and(|image| image.preview == Some(Preview::Unlit))
+    }
+
     /// Puts the lightmap on a material in place of the one it may have; unlit ones show no light.
     fn carry_lightmap(&mut self, document: &mut Document, material: &mut Object) {
         super::layout::drop_extensions(material, &[MOZ_LIGHTMAP]);
@@ -87,9 +96,14 @@ impl Materials {
         let Some(image) = self.image.as_ref().filter(|_| !unlit) else { return };
         let texture = match self.texture {
             Some(texture) => texture,
-            None => place_texture(document, &image.png, &self.occupied),
+            None => place_texture(document, image, &self.occupied),
         };
         self.texture = Some(texture);
+        if let Some(form) = image.preview {
+            let (made, extension) = preview::material(material, form, (texture, image.intensity));
+            *material = made;
+            return document.use_extension(extension);
+        }
         let info = json!({"index": texture, "texCoord": LIGHTMAP_SET, "intensity": image.intensity});
         edit_object(material, "extensions", |extensions| {
             extensions.insert(MOZ_LIGHTMAP.into(), info);
@@ -100,9 +114,10 @@ impl Materials {
 
 /// Adds the lightmap's image, sampler and texture. A file that is baked again gets its new image in
 /// the old one's place, if nobody else uses that.
-fn place_texture(document: &mut Document, png: &[u8], unlit: &BTreeSet<usize>) -> usize {
-    let view = document.add_view(png.to_vec());
-    let image = json!({"bufferView": view, "mimeType": "image/png", "name": "lightmap0"});
+fn place_texture(document: &mut Document, image: &LightmapImage, unlit: &BTreeSet<usize>) -> usize {
+    let view = document.add_view(image.png.clone());
+    let name = if image.preview.is_some() { "preview0" } else { "lightmap0" };
+    let image = json!({"bufferView": view, "mimeType": "image/png", "name": name});
     let sampler = json!({"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071});
     let sampler = match document.list("samplers").iter().position(|known| *known == sampler) {
         Some(known) => known,
@@ -214,7 +229,7 @@ mod tests {
     }
 
     fn materials(unlit: &[usize]) -> Materials {
-        let image = LightmapImage { png: vec![1, 2, 3], intensity: 4.0 };
+        let image = LightmapImage { png: vec![1, 2, 3], intensity: 4.0, preview: None };
         Materials::new(Some(image), unlit.iter().copied().collect())
     }
 

@@ -9,6 +9,13 @@
 //! π, so that it still shows the irradiance; with [`Quantity::Radiosity`] there is no such factor and
 //! the file holds the EXR alone.
 //!
+//! Beside the output the lightmap may lie in files of its own ([`SidecarForm`]).
+//!
+//! With a [`Preview`] lit materials are pictures of the light instead, for viewers that know no lightmaps; the
+//! EXR stays.
+//!
+//! [`Preview`]: crate::options::Preview
+//!
 //! What is not lit stays as it was: nodes, names, animations, skins, cameras, lights, extras, and
 //! extensions that nobody here knows. With [`Topology::Source`] the triangles stay as well.
 //!
@@ -26,13 +33,18 @@ mod error;
 mod exr;
 mod glb;
 mod interpolation;
+mod ktx2;
 mod layout;
 mod materials;
 mod plan;
 mod png;
 mod pool;
+mod preview;
 mod primitive;
 mod references;
+mod rgbm;
+mod separate;
+mod sidecar;
 mod source;
 mod transform;
 mod verify;
@@ -43,8 +55,11 @@ pub use error::ExportError;
 pub use exr::{decode_exr, encode_exr};
 pub(crate) use materials::LIGHTMAP_SET;
 pub use png::{Png, encode_png};
+pub use preview::encode_preview;
+pub use separate::{buffer_beside, referenced_files, separate};
+pub use sidecar::{SidecarForm, encode_sidecar};
 pub use verify::{lightmap_bytes, verify};
-pub use write::{write, write_whole};
+pub use write::{WrittenFile, file_of, write, write_all, write_whole};
 pub(crate) use writer::COBAKE_LIGHTMAP;
 
 use crate::options::BakeOptions;
@@ -65,6 +80,8 @@ pub struct Baked<'a> {
     pub atlas: &'a Atlas,
     /// The texels.
     pub lightmap: &'a Lightmap,
+    /// What the surfaces send out, nits, on the same page; needed where the options ask for a preview.
+    pub preview: Option<&'a Lightmap>,
     /// The solution on its own triangles; written with [`Topology::Adaptive`](crate::options::Topology).
     pub mesh: &'a RadiosityMesh,
     /// What the bake was told; says what the texels hold and which geometry to write.

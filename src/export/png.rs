@@ -42,15 +42,20 @@ pub fn encode_png(lightmap: &Lightmap) -> Result<Png, ExportError> {
         .flatten()
         .map(|&c| (f64::from(c) * factor).round().clamp(0.0, 255.0) as u8)
         .collect();
+    Ok(Png { bytes: rgb8(&samples, (lightmap.width, lightmap.height))?, scale })
+}
+
+/// A PNG of 8-bit RGB samples, row 0 on top.
+pub(super) fn rgb8(samples: &[u8], (width, height): (u32, u32)) -> Result<Vec<u8>, ExportError> {
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(&samples, lightmap.width, lightmap.height, ExtendedColorType::Rgb8)
+        .write_image(samples, width, height, ExtendedColorType::Rgb8)
         .map_err(|source| ExportError::Png { source })?;
-    Ok(Png { bytes, scale })
+    Ok(bytes)
 }
 
 /// What 255 stands for, by the module's rule; 1 for a black map.
-fn scale(lightmap: &Lightmap) -> f32 {
+pub(super) fn scale(lightmap: &Lightmap) -> f32 {
     let mut lit: Vec<f32> = lightmap.texels.iter().flatten().copied().filter(|&c| c > 0.0).collect();
     if lit.is_empty() {
         return 1.0;
@@ -62,7 +67,7 @@ fn scale(lightmap: &Lightmap) -> f32 {
 }
 
 /// The least power of two at or above `value`, held between 2⁻¹²⁶ and 2¹²⁷.
-fn power_of_two_at_least(value: f32) -> f32 {
+pub(super) fn power_of_two_at_least(value: f32) -> f32 {
     (-126..=127).map(|exponent| 2.0_f32.powi(exponent)).find(|&p| p >= value).unwrap_or(2.0_f32.powi(127))
 }
 

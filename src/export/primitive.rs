@@ -42,6 +42,12 @@ pub(super) fn prepare(
             _ => {}
         }
     }
+    // Unlit viewers multiply by vertex colours, which the preview's texels already hold.
+    if materials.are_unlit_previews() {
+        attribute_maps(primitive).into_iter().for_each(|(attributes, _)| {
+            attributes.shift_remove("COLOR_0");
+        });
+    }
     let material = index_of(primitive.get("material"));
     if let Some(variant) = materials.variant(document, material, moved) {
         primitive.insert("material".into(), variant.into());

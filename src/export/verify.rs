@@ -30,7 +30,7 @@ pub fn verify(glb: &[u8]) -> Result<(), ExportError> {
     for image in list("images") {
         let Some(view) = index_of(image.get("bufferView")) else { continue };
         let view = list("bufferViews").get(view).ok_or(problem("an image lies in no bufferView"))?;
-        let ours = image.get("name").is_some_and(|name| name == "lightmap0");
+        let ours = image.get("name").is_some_and(|name| name == "lightmap0" || name == "preview0");
         let bytes = bytes_of(view, binary).unwrap_or_default();
         if ours
             && image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Png).decode().is_err()

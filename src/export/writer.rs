@@ -10,7 +10,7 @@ use super::materials::{LIGHTMAP_SET, LightmapImage, Materials};
 use super::plan::{LitNode, Plan};
 use super::primitive::DRACO;
 use super::source::{self, Rewritten};
-use super::{Baked, ExportError, adaptive, encode_exr, encode_png};
+use super::{Baked, ExportError, adaptive, encode_exr, encode_png, encode_preview};
 use crate::options::{BakeOptions, Quantity, Topology};
 use crate::scene::Placement;
 
@@ -68,16 +68,22 @@ pub(super) fn write_document(baked: &Baked) -> Result<Vec<u8>, ExportError> {
     document.finish()
 }
 
-/// The image for `MOZ_lightmap`, whose texels are irradiance by definition: radiance is scaled by π,
+/// The preview where there is to be one. Else the image for `MOZ_lightmap`, whose texels are irradiance by definition: radiance is scaled by π,
 /// and radiosity cannot be told as irradiance at all, so there the file has no image.
 fn lightmap_image(baked: &Baked) -> Result<Option<LightmapImage>, ExportError> {
+    if let Some(form) = baked.options.preview {
+        let sent_out = baked.preview.ok_or(ExportError::Mismatch { what: "a preview's texels" })?;
+        let png = encode_preview(sent_out, form)?;
+        let intensity = f64::from(png.scale);
+        return Ok(Some(LightmapImage { png: png.bytes, intensity, preview: Some(form) }));
+    }
     let factor = match baked.options.quantity {
         Quantity::Irradiance => 1.0,
         Quantity::Radiance => PI,
         Quantity::Radiosity => return Ok(None),
     };
     let png = encode_png(baked.lightmap)?;
-    Ok(Some(LightmapImage { png: png.bytes, intensity: f64::from(png.scale) * factor }))
+    Ok(Some(LightmapImage { png: png.bytes, intensity: f64::from(png.scale) * factor, preview: None }))
 }
 
 fn includes(quantity: Quantity) -> &'static [&'static str] {

@@ -24,6 +24,7 @@ pub use drawing::{Cell, Line, MeshDrawing};
 pub use lightmap::lightmap_png;
 pub(crate) use png::encode as encode_rgb;
 pub use tone::ToneMap;
+pub(crate) use tone::srgb_byte;
 
 /// A colour of a picture: sRGB, 0 to 255.
 pub type Colour = [u8; 3];

@@ -56,12 +56,12 @@ impl ToneMap {
             return if luminance.is_nan() { [0; 3] } else { [255; 3] };
         }
         let compression = (1.0 + luminance / (WHITE_POINT * WHITE_POINT)) / (1.0 + luminance);
-        (value * compression).to_array().map(encode)
+        (value * compression).to_array().map(srgb_byte)
     }
 }
 
 /// One channel as sRGB (IEC 61966-2-1).
-fn encode(linear: f64) -> u8 {
+pub(crate) fn srgb_byte(linear: f64) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (255.0 * encoded).round() as u8

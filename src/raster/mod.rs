@@ -65,7 +65,7 @@ pub struct RasterInput<'a> {
     pub emitters: &'a [Emitter],
     /// Mean luminance of the irradiance on all surfaces.
     pub typical: f64,
-    /// Reflectance and emission, for [`Quantity::Radiosity`].
+    /// Reflectance and emission, for [`Quantity::Radiosity`] and previews.
     pub appearance: &'a (dyn SurfaceAppearance + Sync),
     /// The caller's options.
     pub options: &'a BakeOptions,
@@ -191,9 +191,20 @@ impl<'a> Lighting<'a> {
     }
 }
 
+/// The pages of one atlas.
+#[derive(Clone, Debug)]
+pub struct Rasterized {
+    /// The lightmap.
+    pub lightmap: Lightmap,
+    /// What the surfaces send out, `L + ρ E / π` in nits, where the options ask for a preview.
+    pub preview: Option<Lightmap>,
+    /// What it took.
+    pub counts: TexelCounts,
+}
+
 /// Computes all texels of the page.
 #[must_use]
-pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> (Lightmap, TexelCounts) {
+pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> Rasterized {
     let input = lighting.input;
     let is_open = |surface: usize, region: usize| !lighting.buried[surface][region];
     let sites = sites(input.surfaces, atlas, &is_open);
@@ -228,16 +239,25 @@ pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> (Lightmap, TexelCounts) 
         let at = site.y as usize * size.0 as usize + site.x as usize;
         let irradiance = DVec3::from_array(texels[at].map(f64::from));
         let chart = &atlas.charts[site.chart as usize];
-        (at, quantity(input, chart, site.point, irradiance).as_vec3().to_array())
+        let preview = input.options.preview.map(|_| radiosity(input, chart, site.point, irradiance) / PI);
+        (at, quantity(input, chart, site.point, irradiance), preview)
     });
-    for (at, value) in finished.collect::<Vec<_>>() {
-        texels[at] = value;
+    let mut preview = input.options.preview.map(|_| vec![[0.0; 3]; count]);
+    for (at, value, sent_out) in finished.collect::<Vec<_>>() {
+        texels[at] = value.as_vec3().to_array();
+        if let (Some(preview), Some(sent_out)) = (&mut preview, sent_out) {
+            preview[at] = sent_out.as_vec3().to_array();
+        }
     }
     tracing::debug!(?counts, "texels");
     let before = valid.iter().filter(|&&v| v).count();
+    if let Some(preview) = &mut preview {
+        dilate(preview, &mut valid.clone(), size, atlas.padding);
+    }
     dilate(&mut texels, &mut valid, size, atlas.padding);
     counts.dilated = (valid.iter().filter(|&&v| v).count() - before) as u64;
-    (Lightmap { width: size.0, height: size.1, texels }, counts)
+    let page = |texels| Lightmap { width: size.0, height: size.1, texels };
+    Rasterized { lightmap: page(texels), preview: preview.map(page), counts }
 }
 
 /// A gap with less light than this fraction of the brightest region of its surface is dark.
@@ -304,12 +324,15 @@ fn quantity(input: &RasterInput, chart: &Chart, point: DVec2, irradiance: DVec3)
     match input.options.quantity {
         Quantity::Irradiance => irradiance,
         Quantity::Radiance => irradiance / PI,
-        Quantity::Radiosity => {
-            let step = texel_steps(chart);
-            let half = 0.5 * (step[0].abs() + step[1].abs());
-            let (min, max) = (point - half, point + half);
-            input.appearance.exitance(chart.surface, min, max)
-                + input.appearance.reflectance(chart.surface, min, max) * irradiance
-        }
+        Quantity::Radiosity => radiosity(input, chart, point, irradiance),
     }
+}
+
+/// What the part of the surface that a texel shows sends out, materials averaged over it.
+fn radiosity(input: &RasterInput, chart: &Chart, point: DVec2, irradiance: DVec3) -> DVec3 {
+    let step = texel_steps(chart);
+    let half = 0.5 * (step[0].abs() + step[1].abs());
+    let (min, max) = (point - half, point + half);
+    input.appearance.exitance(chart.surface, min, max)
+        + input.appearance.reflectance(chart.surface, min, max) * irradiance
 }

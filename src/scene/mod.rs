@@ -38,6 +38,7 @@ pub use error::ImportError;
 pub use item::Item;
 pub use load::{ImportOptions, from_bytes, load};
 pub use uri::UriError;
+pub(crate) use uri::percent_decode;
 
 use std::ops::Range;
 

@@ -101,7 +101,7 @@ fn decode_data(rest: &str) -> Option<Resource> {
 }
 
 /// Replaces each `%41` by its byte; a `%` that starts no such pair stays.
-fn percent_decode(text: &str) -> Vec<u8> {
+pub(crate) fn percent_decode(text: &str) -> Vec<u8> {
     let mut out = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();
     while let [first, tail @ ..] = rest {

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use cobake::export::{ExportError, encode, write, write_whole};
+use cobake::export::{ExportError, WrittenFile, encode, write, write_all, write_whole};
 
 use crate::fixture::{Results, document};
 
@@ -96,4 +96,30 @@ fn gltf_text_is_self_contained() {
     assert_eq!(from_text[0].0, from_glb[0].0);
     assert_eq!(pictures.len(), 2);
     assert_eq!(names(folder.path()), ["out.gltf"]);
+}
+
+/// Where the last of several files cannot take its name, the others are as they were before.
+#[test]
+fn several_files_arrive_together_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| WrittenFile { path: folder.path().join(name), bytes: b"new".to_vec() };
+    fs::write(folder.path().join("old"), "old").unwrap();
+    let fails = [file("none/first"), file("old"), file("fresh")];
+    assert!(write_all(&fails).is_err());
+    assert_eq!(
+        (names(folder.path()), fs::read(&fails[1].path).unwrap()),
+        (vec!["old".into()], b"old".to_vec())
+    );
+
+    // A name that is too long shows only when the others have theirs.
+    let long = WrittenFile { path: folder.path().join("x".repeat(300)), bytes: b"new".to_vec() };
+    assert!(write_all(&[long, file("old"), file("fresh")]).is_err());
+    assert_eq!(
+        (names(folder.path()), fs::read(&fails[1].path).unwrap()),
+        (vec!["old".into()], b"old".to_vec())
+    );
+
+    write_all(&[file("first"), file("old"), file("fresh")]).unwrap();
+    assert_eq!(names(folder.path()), ["first", "fresh", "old"]);
+    assert_eq!(fs::read(&fails[1].path).unwrap(), b"new");
 }

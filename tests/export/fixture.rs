@@ -215,6 +215,7 @@ impl Results {
             surfaces: &self.surfaces,
             atlas: &self.atlas,
             lightmap: &self.lightmap,
+            preview: None,
             mesh: &self.mesh,
             options: &self.options,
         }
