@@ -10,11 +10,13 @@ mod compare;
 mod compare_args;
 mod failure;
 mod files;
+mod inspect;
 mod interrupt;
 mod log;
 mod summary;
 mod table;
 mod terminal;
+mod view;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -51,5 +53,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
     }
 }
