@@ -31,7 +31,7 @@ export function drawLegend(element, mode, scale) {
       ticks: [0, 0.25, 0.5, 0.75, 1].map((t) => short(scale.low * (scale.high / scale.low) ** t)),
     },
     difference: {
-      title: "B against A, of A’s light",
+      title: "B against A, of A’s light; grey: not to be compared",
       map: DIVERGING,
       ticks: [-1, -0.5, 0, 0.5, 1].map((t) => `${t > 0 ? "+" : ""}${short(100 * scale.difference * t)} %`),
     },

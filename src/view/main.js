@@ -133,7 +133,7 @@ function run(renderer, models) {
         const change = (100 * (second.luminance - first.luminance)) / first.luminance;
         lines.push(["B against A", `<b>${change > 0 ? "+" : ""}${change.toFixed(2)} %</b>`]);
       }
-      lines.push(["place, m", found.position.toArray().map((c) => c.toFixed(3)).join(" &nbsp;")]);
+      lines.push(["place, m", found.position.toArray().map((c) => c.toFixed(3)).join("&nbsp; ")]);
       rows.innerHTML = lines.map(([name, text, kind]) => `<dt>${name}</dt><dd class="${kind ?? ""}">${text}</dd>`).join("");
       for (const name of ["node", "material"]) {
         rows.append(Object.assign(document.createElement("dt"), { textContent: name }));

@@ -6,7 +6,7 @@ import { scaleOf } from "view/light";
 
 export const MODES = ["lit", "light", "false", "difference", "charts"];
 
-/** The mode that only writes irradiance, for the difference. */
+/** The mode that writes the light's brightness and the place in space, for the difference. */
 export const MEASURE = 5;
 
 /** Uniforms that all surfaces share. */
@@ -24,11 +24,14 @@ export const shared = {
 
 const vertexShader = `
 in vec2 uv1; in vec2 colourUv; in vec2 emissionUv; in vec2 metalUv; in vec3 tint; in float chart;
-out vec2 vUv1, vColourUv, vEmissionUv, vMetalUv; out vec3 vTint, vCorner; flat out float vChart;
+// At a triangle's edge a pixel's middle may lie beside it, and in the page beside its chart: hence centroid.
+centroid out vec2 vUv1;
+out vec2 vColourUv, vEmissionUv, vMetalUv; out vec3 vTint, vCorner, vPlace; flat out float vChart;
 void main() {
   vUv1 = uv1; vColourUv = colourUv; vEmissionUv = emissionUv; vMetalUv = metalUv; vTint = tint; vChart = chart;
   int corner = gl_VertexID % 3;
   vCorner = vec3(corner == 0, corner == 1, corner == 2);
+  vPlace = (modelMatrix * vec4(position, 1.0)).xyz;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
 }`;
 
@@ -42,7 +45,8 @@ vec3 ${name}(float t) {
 
 const fragmentShader = `
 precision highp float; precision highp int; precision highp sampler2D;
-in vec2 vUv1, vColourUv, vEmissionUv, vMetalUv; in vec3 vTint, vCorner; flat in float vChart;
+centroid in vec2 vUv1;
+in vec2 vColourUv, vEmissionUv, vMetalUv; in vec3 vTint, vCorner, vPlace; flat in float vChart;
 out vec4 pixel;
 uniform sampler2D page, colourMap, emissionMap, metalMap, other;
 uniform bool hasPage, hasColourMap, hasEmissionMap, hasMetalMap, isRadiosity;
@@ -92,7 +96,7 @@ void main() {
   if (hasEmissionMap) shone *= texture(emissionMap, (emissionTransform * vec3(vEmissionUv, 1.0)).xy).rgb;
   vec3 value = hasPage ? stored(vUv1) : vec3(0.0);
   vec3 E = isRadiosity ? max(value - PI * shone, 0.0) / max(albedo, vec3(1e-6)) : value * pageScale;
-  if (mode == ${MEASURE}) { pixel = vec4(E, hasPage ? 1.0 : 0.5); return; }
+  if (mode == ${MEASURE}) { pixel = vec4(hasPage ? brightness(E) : -1.0, vPlace); return; }
   vec3 c;
   if (mode == 0) c = encoded(toned(exposure * (isRadiosity ? value / PI : albedo * E / PI + shone)));
   else if (!hasPage) c = vec3(0.16);
@@ -101,7 +105,9 @@ void main() {
   else if (mode == 3) {
     vec4 b = texelFetch(other, ivec2(gl_FragCoord.xy), 0);
     float a = brightness(E);
-    c = b.a > 0.75 ? diverging(0.5 + 0.5 * (brightness(b.rgb) - a) / max(a, 1e-9 * high) / differenceRange) : vec3(0.3, 0.1, 0.3);
+    // At an edge the pixel's middle may lie beside this surface, where B shows another one.
+    bool isSame = b.r >= 0.0 && distance(b.gba, vPlace) < 0.1 * length(fwidth(vPlace)) + 1e-6 * length(vPlace);
+    c = isSame ? diverging(0.5 + 0.5 * (b.r - a) / max(a, 1e-9 * high) / differenceRange) : vec3(0.3);
   } else c = hue(vChart) * (0.75 + 0.25 * clamp(log(max(brightness(E), 1e-20) / low) / log(high / low), 0.0, 1.0));
   if (grid > 0.0 && hasPage) {
     vec2 t = vUv1 * vec2(textureSize(page, 0)), w = max(fwidth(t), vec2(1e-6));
@@ -112,7 +118,7 @@ void main() {
   if (wire > 0.0) {
     vec3 d = vCorner / max(fwidth(vCorner), vec3(1e-9));
     float line = 1.0 - smoothstep(0.5, 1.3, min(d.x, min(d.y, d.z)));
-    c = mix(c, brightness(c) > 0.5 ? vec3(0.02, 0.1, 0.2) : vec3(0.35, 0.85, 1.0), 0.8 * line);
+    c = mix(c, mode == 2 || mode == 4 ? vec3(0.02, 0.05, 0.1) : vec3(0.35, 0.85, 1.0), 0.75 * line);
   }
   pixel = vec4(c, 1.0);
 }`;
