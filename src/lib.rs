@@ -7,6 +7,7 @@ pub mod element;
 pub mod error;
 pub mod export;
 pub mod geom;
+pub mod inspect;
 pub mod light;
 pub mod options;
 pub mod picture;
@@ -19,6 +20,7 @@ pub mod solve;
 pub mod surface;
 pub mod trace;
 pub mod unwrap;
+pub mod view;
 
 pub use bake::{BakeResult, bake, bake_scene};
 

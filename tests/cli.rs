@@ -510,3 +510,50 @@ fn interrupt_ends_with_130_and_leaves_nothing() {
     assert_eq!(status.code(), Some(130));
     assert_eq!(work.names(), ["desk.glb", "in.glb"]);
 }
+
+/// A small bake that lies in the repository.
+fn baked() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/compare/cornell-64.glb");
+    path.to_string_lossy().into_owned()
+}
+
+#[test]
+fn a_page_is_written_whole_or_not_at_all() {
+    let place = Workplace::new();
+    place.run(&["view", "in.glb", "--out", "page.html"]).refused(1, &["in.glb", "cobake bake"]);
+    place.run(&["view", &baked(), "in.glb", "--out", "page.html"]).refused(1, &["in.glb", "cobake bake"]);
+    place.run(&["view", &baked(), "--out", "none/page.html"]).refused(1, &["none", "does not exist"]);
+    place.run(&["view", "in.glb", "--out", "in.glb"]).refused(2, &["replace", "in.glb"]);
+    place.run(&["view", "absent.glb", "--out", "page.html"]).refused(1, &["absent.glb"]);
+    assert_eq!(place.names(), ["in.glb"]);
+
+    let done = place.run(&["view", &baked(), "--out", "page.html"]);
+    assert_eq!((done.code, done.stdout.as_str(), done.stderr.as_str()), (Some(0), "", ""));
+    let page = std::fs::read_to_string(place.path("page.html")).expect("a page");
+    assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+}
+
+#[test]
+fn inspect_tells_what_a_file_holds() {
+    let place = Workplace::new();
+    let told = place.run(&["inspect", &baked()]);
+    assert_eq!(told.code, Some(0), "{}", told.stderr);
+    for words in ["64 × 64 texels", "irradiance", "charts", "texels a metre", "generator"] {
+        assert!(told.stdout.contains(words), "no {words:?} in {}", told.stdout);
+    }
+    let told = place.run(&["inspect", &baked(), "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON");
+    assert_eq!(json["pages"][0]["width"], 64);
+    assert_eq!(json["pages"][0]["quantity"], "irradiance");
+    place.run(&["inspect", "in.glb"]).refused(1, &["in.glb", "cobake bake"]);
+}
+
+#[test]
+fn inspect_tells_the_light_at_a_place() {
+    let place = Workplace::new();
+    let told = place.run(&["inspect", &baked(), "--json", "--at", "0.1,0,0.1,0,1,0"]);
+    let json: serde_json::Value = serde_json::from_str(&told.stdout).expect("JSON");
+    assert!(json["irradiance"][0].as_f64().is_some_and(|red| red > 0.1), "{}", told.stdout);
+    place.run(&["inspect", &baked(), "--at", "0.1,0,0.1"]).refused(2, &["6 numbers"]);
+    place.run(&["inspect", &baked(), "--at", "9,9,9,0,1,0"]).refused(1, &["9,9,9"]);
+}

@@ -10,7 +10,9 @@ use cobake::options::{
 use super::bytes;
 use super::compare_args::CompareArgs;
 use super::engine::Engine;
+use super::inspect::InspectArgs;
 use super::sidecars::SidecarArgs;
+use super::view::ViewArgs;
 
 /// Bakes lightmaps into glTF scenes: radiosity on a mesh that refines itself near close occluders.
 #[derive(Debug, Parser)]
@@ -31,6 +33,10 @@ pub(crate) enum Command {
     Bake(Box<BakeArgs>),
     /// Tell how far a bake is from reference points, or from another bake
     Compare(CompareArgs),
+    /// Tell what a baked file holds
+    Inspect(InspectArgs),
+    /// Look at a bake, or at two side by side, in a browser: a page that holds everything
+    View(ViewArgs),
 }
 
 /// The words after `bake`. Each option is described in [`BakeOptions`] in the same words.

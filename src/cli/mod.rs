@@ -11,12 +11,14 @@ mod compare_args;
 mod engine;
 mod failure;
 mod files;
+mod inspect;
 mod interrupt;
 mod log;
 mod sidecars;
 mod summary;
 mod table;
 mod terminal;
+mod view;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -53,5 +55,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
     }
 }

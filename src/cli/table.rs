@@ -67,7 +67,7 @@ fn percent(fraction: f64) -> String {
 }
 
 /// Columns two spaces apart: the first to the left, numbers to the right, a last column of words to the left.
-fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
+pub(crate) fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
     let width = |column: usize| rows.iter().filter_map(|row| Some(row.get(column)?.chars().count())).max();
     let widths: Vec<usize> = (0..N).map(|column| width(column).unwrap_or(0)).collect();
     let has_words = N == 3;

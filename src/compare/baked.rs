@@ -46,6 +46,8 @@ pub struct BakedScene {
 struct Page {
     map: Lightmap,
     quantity: Quantity,
+    /// Size of the EXR.
+    bytes: u64,
 }
 
 /// A point on a triangle.
@@ -113,18 +115,28 @@ impl BakedScene {
         self.pages.first().map_or(Quantity::Irradiance, |page| page.quantity)
     }
 
+    /// The scene that was baked.
+    pub(crate) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Its lightmaps: texels, what they hold and the size of the EXR, bytes.
+    pub(crate) fn pages(&self) -> impl ExactSizeIterator<Item = (&Lightmap, Quantity, u64)> {
+        self.pages.iter().map(|page| (&page.map, page.quantity, page.bytes))
+    }
+
     /// Its first lightmap.
     pub(super) fn first_page(&self) -> Option<&Lightmap> {
         self.pages.first().map(|page| &page.map)
     }
 
     /// Its triangles, metres.
-    pub(super) fn triangles(&self) -> &[[DVec3; 3]] {
+    pub(crate) fn triangles(&self) -> &[[DVec3; 3]] {
         self.tracer.triangles()
     }
 
     /// The page of a triangle, and its corners' coordinates there; `None` where no lightmap lights it.
-    pub(super) fn chart(&self, triangle: usize) -> Option<(usize, [DVec2; 3])> {
+    pub(crate) fn chart(&self, triangle: usize) -> Option<(usize, [DVec2; 3])> {
         let placement = self.scene.triangles.get(triangle)?.placement as usize;
         let page = self.page_of.get(placement).copied()??;
         let corners = self.coordinates.get(triangle).copied()??;
@@ -232,7 +244,7 @@ fn read_page(path: &Path, scene: &Scene, index: usize, entry: &Value) -> Result<
     if map.texels.is_empty() {
         return Err(fault("has no texels".to_owned()));
     }
-    Ok(Page { map, quantity })
+    Ok(Page { map, quantity, bytes: bytes.len() as u64 })
 }
 
 /// The bytes of the bufferView that a lightmap names.

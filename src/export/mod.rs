@@ -53,6 +53,7 @@ mod writer;
 
 pub use error::ExportError;
 pub use exr::{decode_exr, encode_exr};
+pub(crate) use glb::base64;
 pub(crate) use materials::LIGHTMAP_SET;
 pub use png::{Png, encode_png};
 pub use preview::encode_preview;
@@ -65,7 +66,7 @@ pub(crate) use writer::COBAKE_LIGHTMAP;
 use crate::options::BakeOptions;
 use crate::raster::Lightmap;
 use crate::retriangulate::RadiosityMesh;
-use crate::scene::Scene;
+use crate::scene::{Scene, SourceDocument};
 use crate::surface::Surface;
 use crate::unwrap::Atlas;
 
@@ -97,4 +98,9 @@ pub fn encode(baked: &Baked) -> Result<Vec<u8>, ExportError> {
     let glb = writer::write_document(baked)?;
     verify::still_accepted(&baked.scene.source.json, &glb)?;
     Ok(glb)
+}
+
+/// A document as a GLB that needs no other file. What it holds stays as it is.
+pub(crate) fn self_contained(source: &SourceDocument) -> Result<Vec<u8>, ExportError> {
+    document::Document::open(source).finish()
 }

@@ -107,6 +107,9 @@ fn provenance(baked: &Baked) -> Value {
         "unshotFraction": baked.options.unshot_fraction,
         "gatherError": baked.options.gather_error,
         "maxReflectance": baked.options.max_reflectance,
+        "resolution": baked.options.resolution,
+        "density": baked.options.density,
+        "mips": baked.options.mips,
         "texelsPerMetre": baked.atlas.texels_per_metre,
         "padding": baked.atlas.padding,
     })
