@@ -25,10 +25,14 @@ const PNG_STEP = 1 / 255;
 
 /** A page that has run a module of ours, bundled with what it imports. */
 async function withModule(browser, module, test) {
-  const bundled = await build({ entryPoints: [here(module)], bundle: true, format: "iife", write: false });
+  const bundled = await build({ entryPoints: [here(module)], bundle: true, format: "esm", write: false });
   const { page, complaints } = await open(browser);
-  await page.setContent("<!doctype html><title>reader</title>");
-  await page.addScriptTag({ content: bundled.outputFiles[0].text });
+  // Nobody listens there: the answer is ours. A page needs an address that others can be told from.
+  await page.route("http://127.0.0.1/", (route) =>
+    route.fulfill({ contentType: "text/html", body: "<!doctype html><title>reader</title><link rel=icon href=data:,>" }));
+  await page.goto("http://127.0.0.1/");
+  await page.addScriptTag({ type: "module", content: bundled.outputFiles[0].text });
+  await page.waitForFunction(() => globalThis.renderWithThree ?? globalThis.loadInModelViewer);
   await test(page);
   await page.close();
   assert.deepEqual(complaints, []);
@@ -70,8 +74,18 @@ const three = (exr) => async ({ browser, program, a: file }) => {
   });
 };
 
+async function modelViewer({ browser, a: file }) {
+  const bytes = await readFile(file);
+  const json = JSON.parse(bytes.subarray(20, 20 + bytes.readUInt32LE(12)));
+  await withModule(browser, "model_viewer_page.mjs", async (page) => {
+    const names = await page.evaluate((glb) => globalThis.loadInModelViewer(glb), bytes.toString("base64"));
+    assert.deepEqual(names, json.materials.map((material) => material.name));
+  });
+}
+
 /** Name and test of each reader; a further kind of output is a further line. */
 export const readerCases = [
   ["three.js: the EXR as light map", three(true)],
   ["three.js: MOZ_lightmap", three(false)],
+  ["model-viewer: loads", modelViewer],
 ];
