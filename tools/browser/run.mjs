@@ -7,6 +7,7 @@
 // that throws where something is not as it should be. Exit code: 0 when all hold, 1 when one does not, 2 for wrong use.
 
 import { launch } from "./chromium.mjs";
+import { readerCases } from "./readers.mjs";
 import { viewCases } from "./view.mjs";
 
 const [program, a, b, ...rest] = process.argv.slice(2);
@@ -15,7 +16,7 @@ if (!b || rest.length > 0) {
   process.exit(2);
 }
 
-const CASES = [...viewCases];
+const CASES = [...viewCases, ...readerCases];
 
 const browser = await launch();
 let failed = 0;
