@@ -253,3 +253,27 @@ fn close_objects_buffers_cost_little_and_ask_about_the_shaft() {
     assert_eq!(heedless.cob.splits_saved_by_shaft, 0);
     assert!(heedless.cob.splits > report.cob.splits);
 }
+
+/// Each instance shares all but its place in the lightmap, and gets light of its own.
+#[test]
+fn instances_get_light_of_their_own() {
+    let mut draft = Draft::square();
+    let places = draft.accessor("VEC3", FLOAT, &floats(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 3.0, 0.0]));
+    let instancing = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    draft.set("/nodes/1/extensions", instancing);
+    draft.set("/extensionsUsed", json!(["EXT_mesh_gpu_instancing"]));
+    let result = bake_scene(&draft.scene(), &sized(64), &mut Silent).expect("baked");
+    let (json, _) = unpack(&result.glb);
+    assert!(!json.to_string().contains("EXT_mesh_gpu_instancing"));
+    let attributes: Vec<&Value> = (2..5)
+        .map(|node| {
+            assert!(json["nodes"][node]["extensions"]["COBAKE_lightmap"].is_object());
+            let mesh = json["nodes"][node]["mesh"].as_u64().expect("a mesh") as usize;
+            &json["meshes"][mesh]["primitives"][0]["attributes"]
+        })
+        .collect();
+    for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+        assert_eq!(attributes[a]["POSITION"], attributes[b]["POSITION"]);
+        assert_ne!(attributes[a]["TEXCOORD_1"], attributes[b]["TEXCOORD_1"]);
+    }
+}

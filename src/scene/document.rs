@@ -58,7 +58,14 @@ pub(super) struct NodeExtensions {
     #[serde(rename = "KHR_lights_punctual")]
     pub(super) light: Option<LightReference>,
     #[serde(rename = "EXT_mesh_gpu_instancing")]
-    pub(super) instancing: Option<IgnoredAny>,
+    pub(super) instancing: Option<Instancing>,
+}
+
+/// A node's instances: accessors by attribute.
+#[derive(Debug, Deserialize)]
+pub(super) struct Instancing {
+    #[serde(default)]
+    pub(super) attributes: std::collections::BTreeMap<String, usize>,
 }
 
 #[derive(Debug, Deserialize)]

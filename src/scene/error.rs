@@ -175,6 +175,30 @@ pub enum ImportError {
         length: usize,
     },
 
+    /// A compressed buffer view cannot be decoded.
+    #[error(
+        "{view}, compressed by EXT_meshopt_compression, {fault}; compress the file again from its source"
+    )]
+    Meshopt {
+        /// The buffer view.
+        view: Item,
+        /// Why.
+        fault: &'static str,
+    },
+
+    /// Attributes of one node's instances that differ in length.
+    #[error("{node} has {count} values of {attribute} for {instances} instances; export the file again")]
+    InstanceLength {
+        /// The node.
+        node: Item,
+        /// The attribute.
+        attribute: String,
+        /// Its length.
+        count: usize,
+        /// The number of instances.
+        instances: usize,
+    },
+
     /// An accessor cannot be read.
     #[error("{accessor} {fault}")]
     Accessor {

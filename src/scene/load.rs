@@ -12,7 +12,7 @@ use super::pyramid::Pyramid;
 use super::texture::Request;
 use super::warning::Warnings;
 use super::{ImportError, Item, Material, PunctualLight, Scene, SourceDocument};
-use super::{container, extension, hierarchy, material, place, punctual, source, texture, uri};
+use super::{container, extension, hierarchy, instancing, material, place, punctual, source, texture, uri};
 
 /// What an import can be told.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,14 +48,21 @@ pub fn load(path: &Path, options: &ImportOptions) -> Result<Scene, ImportError> 
 /// As [`load`].
 pub fn from_bytes(bytes: &[u8], base: Option<&Path>, options: &ImportOptions) -> Result<Scene, ImportError> {
     let container = container::split(bytes)?;
-    let json = serde_json::from_slice(container.json).map_err(|source| ImportError::Json { source })?;
-    let document = Document::read(&json)?;
+    let mut json = serde_json::from_slice(container.json).map_err(|source| ImportError::Json { source })?;
+    let mut document = Document::read(&json)?;
     let mut warnings = Warnings::default();
     extension::check_required(&document)?;
-    extension::warn_of_used(&document, &mut warnings);
+    #[cfg_attr(not(feature = "meshopt"), expect(unused_mut, reason = "nothing is decoded"))]
+    let mut buffers = source::read_buffers(&document, container.binary, base)?;
+    #[cfg(feature = "meshopt")]
+    if super::meshopt::decode(&mut json, &mut buffers)? {
+        document = Document::read(&json)?;
+    }
+    if instancing::expand(&mut json, &document, &buffers)? {
+        document = Document::read(&json)?;
+    }
 
     let nodes = hierarchy::traverse(&document, options.scene, &mut warnings)?;
-    let buffers = source::read_buffers(&document, container.binary, base)?;
     let external_images = source::read_images(&document, base, &mut warnings);
     let accessors = Accessors { document: &document, buffers: &buffers };
     let sets = |material| material::texture_coordinate_sets(&document, material);

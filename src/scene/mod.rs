@@ -5,7 +5,8 @@
 //! stage alone opens again.
 //!
 //! The order of work: `container` splits the file, `document` types its JSON, `extension` refuses
-//! what cannot be honoured, `source` reads buffers and images, `hierarchy` finds the nodes' places,
+//! what cannot be honoured, `source` reads buffers and images, `meshopt` decodes and `instancing` expands
+//! what the document holds in short, `hierarchy` finds the nodes' places,
 //! `place` puts `primitive`s there (through `accessor`s), `material` and `punctual` read what
 //! shines and reflects, and `appearance` answers what a point looks like (`texture`, `pyramid`).
 //!
@@ -20,9 +21,12 @@ mod document;
 mod error;
 mod extension;
 mod hierarchy;
+mod instancing;
 mod item;
 mod load;
 mod material;
+#[cfg(feature = "meshopt")]
+mod meshopt;
 mod place;
 mod primitive;
 mod punctual;
