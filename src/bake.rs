@@ -27,6 +27,7 @@ mod budget;
 mod cells;
 mod page;
 mod scale;
+mod screens;
 mod weights;
 mod written;
 
@@ -182,5 +183,5 @@ fn tracer(scene: &Scene) -> Tracer {
         .iter()
         .map(|t| scene.materials[scene.placements[t.placement as usize].material].double_sided)
         .collect();
-    Tracer::new(triangles).with_double_sided(double_sided)
+    Tracer::new(triangles).with_double_sided(double_sided).with_screens(screens::of_triangles(scene))
 }

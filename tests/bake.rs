@@ -277,3 +277,59 @@ fn instances_get_light_of_their_own() {
         assert_ne!(attributes[a]["TEXCOORD_1"], attributes[b]["TEXCOORD_1"]);
     }
 }
+
+/// A floor under a sun, and a card over half of its width whose `material` and coordinates count; what the floor's
+/// texels show beneath the card's middle and beside the card, as a fraction of the sun.
+fn under_a_card(material: &Value, side: u32) -> (f64, f64) {
+    let mut draft = Draft::square();
+    let mut texels = Vec::new();
+    for k in 0..64 {
+        texels.push([0, 0, 0, if (k / 8 + k % 8) % 2 == 0 { 255 } else { 0 }]);
+    }
+    draft.texture_with_alpha(8, &texels);
+    draft.set("/materials/0", material.clone());
+    draft.set("/materials/-", json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}}));
+    let floor = [[-2.0, -2.0, -1.0], [3.0, -2.0, -1.0], [3.0, 3.0, -1.0], [-2.0, 3.0, -1.0]].concat();
+    let positions = draft.accessor("VEC3", FLOAT, &floats(&floor));
+    let indices = draft.json["meshes"][0]["primitives"][0]["indices"].clone();
+    draft.set(
+        "/meshes/-",
+        json!({"primitives": [{"attributes": {"POSITION": positions}, "indices": indices, "material": 1}]}),
+    );
+    draft.set("/nodes/-", json!({"mesh": 1}));
+    draft.set("/nodes/-", json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    draft.set("/scenes/0/nodes", json!([0, 2, 3]));
+    draft.set(
+        "/extensions",
+        json!({"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 10}]}}),
+    );
+    let mut options = sized(side);
+    options.density = cobake::options::DensityPolicy::Uniform;
+    let result = bake_scene(&draft.scene(), &options, &mut Silent).expect("baked");
+    let surface = result.surfaces.iter().position(|s| s.area > 20.0).expect("a floor");
+    let at = |x: f64, y: f64| {
+        f64::from(lookup(&result, surface, result.surfaces[surface].frame.project(DVec3::new(x, y, -1.0))).x)
+            / 10.0
+    };
+    let points = (0..64 * 64).map(|k| at((f64::from(k % 64) + 0.5) / 64.0, (f64::from(k / 64) + 0.5) / 64.0));
+    (points.sum::<f64>() / 4096.0, at(2.0, 2.0))
+}
+
+/// Half of a card's texels are clear in a checker, so that half of the sun passes; a blended card stops its alpha;
+/// an opaque one's alpha says nothing.
+#[test]
+fn cards_throw_the_shadows_of_their_alpha() {
+    let texture = json!({"index": 0});
+    let checker = json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorTexture": texture}});
+    let (mean, beside) = under_a_card(&checker, 256);
+    assert!((beside - 1.0).abs() < 0.002, "{beside} of the sun beside the card");
+    assert!((mean - 0.5).abs() < 0.02, "{mean} of the sun through a checker");
+
+    let veil = json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.25]}});
+    let (mean, beside) = under_a_card(&veil, 64);
+    // The outermost texels reach into the light.
+    assert!((beside - 1.0).abs() < 0.002 && (mean - 0.75).abs() < 0.03, "{mean} beneath, {beside} beside");
+
+    let solid = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.25]}});
+    assert!(under_a_card(&solid, 64).0 < 0.05);
+}

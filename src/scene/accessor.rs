@@ -219,6 +219,11 @@ impl Numbers {
         self.values.len() / self.width
     }
 
+    /// Components of an element.
+    pub(super) fn components(&self) -> usize {
+        self.width
+    }
+
     /// The elements as arrays of their first `N` components; missing components read as zero.
     pub(super) fn arrays<const N: usize>(&self) -> impl Iterator<Item = [f64; N]> {
         self.values

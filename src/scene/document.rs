@@ -190,6 +190,7 @@ pub(super) struct MaterialEntry {
     pub(super) emissive_factor: Option<[f64; 3]>,
     pub(super) emissive_texture: Option<TextureInfo>,
     pub(super) alpha_mode: Option<String>,
+    pub(super) alpha_cutoff: Option<f64>,
     #[serde(default)]
     pub(super) double_sided: bool,
     #[serde(default)]

@@ -1,6 +1,7 @@
 //! From a file to a scene: the stage's parts in order.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -95,7 +96,7 @@ fn decode_all(
     source: &SourceDocument,
     requests: &[Request],
     warnings: &mut Warnings,
-) -> Result<Vec<Option<Pyramid>>, ImportError> {
+) -> Result<Vec<Option<Arc<Pyramid>>>, ImportError> {
     let decode = |request: &Request| {
         let bytes = source::image_bytes(document, source, request.image)?;
         Ok(bytes.map(|bytes| texture::decode(bytes, request.encoding)))
@@ -106,7 +107,7 @@ fn decode_all(
         let image = document.images.get(request.image);
         let item = Item::new("image", request.image, image.and_then(|image| image.name.as_deref()));
         textures.push(match decoded {
-            Some(Ok(pyramid)) => Some(pyramid),
+            Some(Ok(pyramid)) => Some(Arc::new(pyramid)),
             Some(Err(fault)) => {
                 let text =
                     format!("cannot be decoded ({fault}); materials that use it keep their factors alone");

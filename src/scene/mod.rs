@@ -8,7 +8,7 @@
 //! what cannot be honoured, `source` reads buffers and images, `meshopt` decodes and `instancing` expands
 //! what the document holds in short, `hierarchy` finds the nodes' places,
 //! `place` puts `primitive`s there (through `accessor`s), `material` and `punctual` read what
-//! shines and reflects, and `appearance` answers what a point looks like (`texture`, `pyramid`).
+//! shines and reflects, and `appearance` and `coverage` answer what a point looks like and how much of it is there (`texture`, `pyramid`).
 //!
 //! Every index, offset and length is checked where it is followed; nothing is allocated by a count
 //! alone. What is wrong is an [`ImportError`]; what is merely odd is a warning.
@@ -17,6 +17,7 @@ mod accessor;
 mod appearance;
 mod container;
 mod coordinates;
+mod coverage;
 mod document;
 mod error;
 mod extension;
@@ -38,6 +39,7 @@ mod warning;
 
 pub use accessor::AccessorFault;
 pub use appearance::Appearance;
+pub use coverage::Coverage;
 pub use error::ImportError;
 pub use item::Item;
 pub use load::{ImportOptions, from_bytes, load};

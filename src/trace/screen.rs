@@ -250,7 +250,7 @@ mod tests {
         let fans = [Fan::new(&[DVec3::Z; FAN])];
         let axes = [DVec3::X, DVec3::Y, DVec3::Z];
         tracer.look(from, axes, &fans, &mut FanStack::default(), |hit, _, share| {
-            seen.push((hit.triangle, share))
+            seen.push((hit.triangle, share));
         });
         assert_eq!(seen.len(), 3 * FAN);
         assert_eq!(seen[..3], followed[..]);
