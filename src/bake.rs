@@ -71,7 +71,8 @@ pub fn bake(path: &Path, options: &BakeOptions, progress: &mut dyn Progress) -> 
     pool.install(|| {
         let mut recorder = Recorder::new(progress);
         recorder.begin(Stage::Import);
-        let scene = crate::scene::load(path, &ImportOptions { scene: options.scene })?;
+        let scene =
+            crate::scene::load(path, &ImportOptions { scene: options.scene, dynamic: options.dynamic })?;
         run(&scene, options, recorder)
     })
 }

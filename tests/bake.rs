@@ -281,6 +281,12 @@ fn instances_get_light_of_their_own() {
 /// A floor under a sun, and a card over half of its width whose `material` and coordinates count; what the floor's
 /// texels show beneath the card's middle and beside the card, as a fraction of the sun.
 fn under_a_card(material: &Value, side: u32) -> (f64, f64) {
+    let result = bake_under_a_card(material, &json!({}), side);
+    shadow_of_the_card(&result)
+}
+
+/// The card's node has these `extras`.
+fn bake_under_a_card(material: &Value, extras: &Value, side: u32) -> BakeResult {
     let mut draft = Draft::square();
     let mut texels = Vec::new();
     for k in 0..64 {
@@ -305,10 +311,14 @@ fn under_a_card(material: &Value, side: u32) -> (f64, f64) {
     );
     let mut options = sized(side);
     options.density = cobake::options::DensityPolicy::Uniform;
-    let result = bake_scene(&draft.scene(), &options, &mut Silent).expect("baked");
+    draft.set("/nodes/1/extras", json!({"cobake": extras}));
+    bake_scene(&draft.scene(), &options, &mut Silent).expect("baked")
+}
+
+fn shadow_of_the_card(result: &BakeResult) -> (f64, f64) {
     let surface = result.surfaces.iter().position(|s| s.area > 20.0).expect("a floor");
     let at = |x: f64, y: f64| {
-        f64::from(lookup(&result, surface, result.surfaces[surface].frame.project(DVec3::new(x, y, -1.0))).x)
+        f64::from(lookup(result, surface, result.surfaces[surface].frame.project(DVec3::new(x, y, -1.0))).x)
             / 10.0
     };
     let points = (0..64 * 64).map(|k| at((f64::from(k % 64) + 0.5) / 64.0, (f64::from(k / 64) + 0.5) / 64.0));
@@ -332,4 +342,33 @@ fn cards_throw_the_shadows_of_their_alpha() {
 
     let solid = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.25]}});
     assert!(under_a_card(&solid, 64).0 < 0.05);
+}
+
+/// A card without a lightmap still throws a shadow, and one that does not cast still has a lightmap.
+#[test]
+fn nodes_have_their_say() {
+    let solid = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}});
+    let parts = |result: &BakeResult| {
+        let (json, _) = unpack(&result.glb);
+        let lit = |node: usize| json["nodes"][node]["extensions"]["COBAKE_lightmap"].is_object();
+        (lit(1), lit(2), shadow_of_the_card(result).0)
+    };
+    let unlit = bake_under_a_card(&solid, &json!({"bake": false}), 64);
+    let (card, floor, light) = parts(&unlit);
+    assert!(!card && floor && light < 0.05, "{card} {floor} {light}");
+    let (json, _) = unpack(&unlit.glb);
+    assert!(json["meshes"][0]["primitives"][0]["attributes"].get("TEXCOORD_1").is_none());
+    let (card, floor, light) = parts(&bake_under_a_card(&solid, &json!({"cast": false}), 64));
+    assert!(card && floor && (light - 1.0).abs() < 0.002, "{card} {floor} {light}");
+
+    let density = |extras: Value| {
+        let result = bake_under_a_card(&solid, &extras, 64);
+        let card = result.surfaces.iter().position(|s| s.area < 2.0).expect("a card");
+        let of = |surface: usize| {
+            result.atlas.charts_of(surface)[0].texel_from_plane.matrix2.determinant().abs().sqrt()
+        };
+        of(card) / of(1 - card)
+    };
+    let ratio = density(json!({"density": 4})) / density(json!({}));
+    assert!((ratio / 4.0 - 1.0).abs() < 0.15, "{ratio} times as dense");
 }

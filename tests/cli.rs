@@ -17,6 +17,7 @@ const OPTIONS: [&str; 25] = [
     "--budget",
     "--size",
     "--texels-per-metre",
+    "--dynamic",
     "--threads",
     "--report",
     "--pictures",

@@ -156,7 +156,9 @@ fn scenes_are_chosen_by_index() {
     let mut draft = Draft::square();
     draft.set("/scenes", json!([{"nodes": []}, {"nodes": [0]}, {"nodes": [1]}]));
     assert!(draft.refusal().contains("no triangles"));
-    let with = |scene| from_bytes(&draft.glb(), None, &ImportOptions { scene: Some(scene) });
+    let with = |scene| {
+        from_bytes(&draft.glb(), None, &ImportOptions { scene: Some(scene), ..ImportOptions::default() })
+    };
     assert_eq!(with(2).unwrap().placements[0].node, 1);
     let message = with(3).unwrap_err().to_string();
     assert_eq!(message, "there is no scene 3: the file holds 3, 0 to 2");
@@ -307,11 +309,59 @@ fn skins_and_morphs_are_baked_at_rest() {
     let shift = draft.accessor("VEC3", FLOAT, &floats(&[0.0, 1.0, 0.0].repeat(4)));
     draft.set("/meshes/0/primitives/0/targets", json!([{"POSITION": shift}]));
     draft.set("/meshes/0/weights", json!([0.5]));
+    let refused = draft.refusal();
+    assert!(refused.contains("no mesh of the scene can hold a lightmap"), "{refused}");
+    draft.set("/nodes/-", json!({"name": "Still", "mesh": 1})).set("/scenes/0/nodes", json!([0, 2, 3]));
+    let mut still = draft.json["meshes"][0].clone();
+    still["primitives"][0].as_object_mut().unwrap().remove("targets");
+    draft.set("/meshes/-", still);
     let scene = draft.scene();
+    assert_eq!(scene.placements.iter().map(|p| p.node).collect::<Vec<_>>(), [3]);
+    assert!(scene.warnings.join("\n").contains("node 1 (\"Wall\"): it moves"), "{:?}", scene.warnings);
+
+    let cast = ImportOptions { dynamic: cobake::options::Dynamic::Cast, ..ImportOptions::default() };
+    let scene = from_bytes(&draft.glb(), None, &cast).unwrap();
     assert_eq!(scene.vertices[1], DVec3::new(1.0, 0.5, 5.0), "the node's own transform has no say");
-    let warnings = scene.warnings.join("\n");
-    assert!(warnings.contains("node 1 (\"Wall\"): it is skinned"), "{warnings}");
-    assert!(warnings.contains("node 1 (\"Wall\"): it can be morphed"), "{warnings}");
+    assert!(!scene.placements[0].settings.bake && scene.placements[1].settings.bake);
+    assert!(scene.warnings.join("\n").contains("its rest pose throws shadows"), "{:?}", scene.warnings);
+}
+
+/// What an animation moves is dynamic, and so is all below it; weights change a mesh alone.
+#[test]
+fn animated_nodes_and_those_below_are_dynamic() {
+    let mut draft = Draft::square();
+    draft.set("/nodes/-", json!({"name": "Still", "mesh": 0})).set("/scenes/0/nodes", json!([0, 2]));
+    let target = |path: &str| json!([{"channels": [{"sampler": 0, "target": {"node": 0, "path": path}}]}]);
+    let placed = |draft: &Draft| draft.scene().placements.iter().map(|p| p.node).collect::<Vec<_>>();
+    draft.set("/animations", target("rotation"));
+    assert_eq!(placed(&draft), [2]);
+    draft.set("/animations", target("weights"));
+    assert_eq!(placed(&draft), [1, 2]);
+    let pointer = json!({"KHR_animation_pointer": {"pointer": "/nodes/1/translation"}});
+    draft.set("/animations", json!([{"channels": [{"target": {"path": "pointer", "extensions": pointer}}]}]));
+    assert_eq!(placed(&draft), [2]);
+}
+
+/// Settings hold for a node and all below it; what cannot be followed is refused by name.
+#[test]
+fn nodes_say_how_they_are_baked() {
+    let mut draft = Draft::square();
+    draft.set("/nodes/0/extras", json!({"cobake": {"density": 2, "cast": false}}));
+    draft.set("/nodes/1/extras", json!({"cobake": {"cast": true, "shine": 1}, "mine": 7}));
+    let scene = draft.scene();
+    let settings = scene.placements[0].settings;
+    assert_eq!((settings.bake, settings.density, settings.cast), (true, 2.0, true));
+    assert!(scene.warnings.join("\n").contains("no setting \"shine\""), "{:?}", scene.warnings);
+    for (extras, expected) in [
+        (json!({"density": 0}), "node 1 (\"Wall\") has extras.cobake.density = 0, which must be a number"),
+        (json!({"bake": "no"}), "extras.cobake.bake = \"no\", which must be true or false"),
+        (json!(false), "extras.cobake = false, which must be an object"),
+        (json!({"bake": false}), "no mesh of the scene can hold a lightmap"),
+    ] {
+        draft.set("/nodes/1/extras", json!({"cobake": extras}));
+        let message = draft.refusal().replace("\\\"", "\"");
+        assert!(message.contains(expected), "{message}");
+    }
 }
 
 /// One property changed for the worse, and what the message must say of it.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::scene::{Coverage, Scene};
+use crate::scene::{Coverage, Scene, Triangle};
 use crate::trace::Screen;
 
 /// A triangle that is not there all over.
@@ -17,8 +17,21 @@ impl Screen for Cutout {
     }
 }
 
+/// A triangle that stands in nobody's way.
+#[derive(Debug)]
+struct Nothing;
+
+impl Screen for Nothing {
+    fn coverage(&self, _: DVec3) -> f64 {
+        0.0
+    }
+}
+
 /// For each of the scene's triangles how it lets light through; `None` where it is solid.
 pub(super) fn of_triangles(scene: &Scene) -> Vec<Option<Arc<dyn Screen>>> {
-    let of = |triangle| Some(Arc::new(Cutout(scene.coverage(triangle)?)) as Arc<dyn Screen>);
-    (0..scene.triangles.len()).map(of).collect()
+    let of = |(index, triangle): (usize, &Triangle)| -> Option<Arc<dyn Screen>> {
+        let casts = scene.placements.get(triangle.placement as usize).is_none_or(|p| p.settings.cast);
+        if casts { Some(Arc::new(Cutout(scene.coverage(index)?))) } else { Some(Arc::new(Nothing)) }
+    };
+    scene.triangles.iter().enumerate().map(of).collect()
 }

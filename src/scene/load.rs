@@ -13,7 +13,10 @@ use super::pyramid::Pyramid;
 use super::texture::Request;
 use super::warning::Warnings;
 use super::{ImportError, Item, Material, PunctualLight, Scene, SourceDocument};
-use super::{container, extension, hierarchy, instancing, material, place, punctual, source, texture, uri};
+use super::{
+    container, extension, hierarchy, instancing, material, place, punctual, settings, source, texture, uri,
+};
+use crate::options::Dynamic;
 
 /// What an import can be told.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,6 +24,8 @@ pub struct ImportOptions {
     /// Which of the document's scenes to read, by index. Default: the document's own default, else its
     /// first; all root nodes where the document has no scenes.
     pub scene: Option<usize>,
+    /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
+    pub dynamic: Dynamic,
 }
 
 /// Reads the scene in the `.glb` or `.gltf` file at `path`.
@@ -67,10 +72,8 @@ pub fn from_bytes(bytes: &[u8], base: Option<&Path>, options: &ImportOptions) ->
     let external_images = source::read_images(&document, base, &mut warnings);
     let accessors = Accessors { document: &document, buffers: &buffers };
     let sets = |material| material::texture_coordinate_sets(&document, material);
-    let placed = place::place(accessors, &nodes, &sets, &mut warnings)?;
-    if placed.triangles.is_empty() {
-        return Err(ImportError::NoTriangles);
-    }
+    let settings = settings::of_nodes(&json, &document, &nodes, &mut warnings)?;
+    let placed = place::place(accessors, &nodes, (&settings, options.dynamic), &sets, &mut warnings)?;
 
     let used = materials_in_use(&document, &placed);
     let palette = material::read(&document, &used, &mut warnings)?;

@@ -32,6 +32,7 @@ mod place;
 mod primitive;
 mod punctual;
 mod pyramid;
+mod settings;
 mod source;
 mod texture;
 mod uri;
@@ -43,6 +44,7 @@ pub use coverage::Coverage;
 pub use error::ImportError;
 pub use item::Item;
 pub use load::{ImportOptions, from_bytes, load};
+pub use settings::NodeSettings;
 pub use uri::UriError;
 
 use std::ops::Range;
@@ -92,7 +94,7 @@ pub struct Triangle {
 }
 
 /// A primitive as a node places it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     /// Index into the document's `nodes`.
     pub node: usize,
@@ -109,6 +111,8 @@ pub struct Placement {
     /// Whether the node's transform mirrors, so that corners 1 and 2 of each triangle are swapped
     /// against the source's order.
     pub mirrored: bool,
+    /// How it takes part in the bake. What moves has `bake` off.
+    pub settings: NodeSettings,
 }
 
 /// What a surface does with light. Textures are reached through [`Scene::reflectance_at`]
