@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 25] = [
+const OPTIONS: [&str; 26] = [
     "--output",
     "--budget",
     "--size",
