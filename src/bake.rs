@@ -27,6 +27,7 @@ mod budget;
 mod cells;
 mod page;
 mod scale;
+mod screens;
 mod weights;
 mod written;
 
@@ -70,7 +71,8 @@ pub fn bake(path: &Path, options: &BakeOptions, progress: &mut dyn Progress) -> 
     pool.install(|| {
         let mut recorder = Recorder::new(progress);
         recorder.begin(Stage::Import);
-        let scene = crate::scene::load(path, &ImportOptions { scene: options.scene })?;
+        let scene =
+            crate::scene::load(path, &ImportOptions { scene: options.scene, dynamic: options.dynamic })?;
         run(&scene, options, recorder)
     })
 }
@@ -184,5 +186,5 @@ fn tracer(scene: &Scene) -> Tracer {
         .iter()
         .map(|t| scene.materials[scene.placements[t.placement as usize].material].double_sided)
         .collect();
-    Tracer::new(triangles).with_double_sided(double_sided)
+    Tracer::new(triangles).with_double_sided(double_sided).with_screens(screens::of_triangles(scene))
 }

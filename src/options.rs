@@ -35,6 +35,18 @@ pub enum Direct {
     Texel,
 }
 
+/// What becomes of meshes that move: by animation, skin or morph targets. None gets a lightmap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Dynamic {
+    /// They are left out of the bake.
+    #[default]
+    Ignore,
+    /// They throw shadows, and light, from where they rest.
+    Cast,
+}
+
 /// What the output's geometry is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -175,6 +187,8 @@ pub struct BakeOptions {
     pub mips: u32,
     /// Which of the document's scenes to bake. Default: its default scene.
     pub scene: Option<usize>,
+    /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
+    pub dynamic: Dynamic,
 }
 
 /// A choice between on and off that reads as a word.
@@ -211,6 +225,7 @@ impl Default for BakeOptions {
             padding: None,
             mips: 0,
             scene: None,
+            dynamic: Dynamic::default(),
         }
     }
 }

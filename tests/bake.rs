@@ -253,3 +253,122 @@ fn close_objects_buffers_cost_little_and_ask_about_the_shaft() {
     assert_eq!(heedless.cob.splits_saved_by_shaft, 0);
     assert!(heedless.cob.splits > report.cob.splits);
 }
+
+/// Each instance shares all but its place in the lightmap, and gets light of its own.
+#[test]
+fn instances_get_light_of_their_own() {
+    let mut draft = Draft::square();
+    let places = draft.accessor("VEC3", FLOAT, &floats(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 3.0, 0.0]));
+    let instancing = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    draft.set("/nodes/1/extensions", instancing);
+    draft.set("/extensionsUsed", json!(["EXT_mesh_gpu_instancing"]));
+    let result = bake_scene(&draft.scene(), &sized(64), &mut Silent).expect("baked");
+    let (json, _) = unpack(&result.glb);
+    assert!(!json.to_string().contains("EXT_mesh_gpu_instancing"));
+    let attributes: Vec<&Value> = (2..5)
+        .map(|node| {
+            assert!(json["nodes"][node]["extensions"]["COBAKE_lightmap"].is_object());
+            let mesh = json["nodes"][node]["mesh"].as_u64().expect("a mesh") as usize;
+            &json["meshes"][mesh]["primitives"][0]["attributes"]
+        })
+        .collect();
+    for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+        assert_eq!(attributes[a]["POSITION"], attributes[b]["POSITION"]);
+        assert_ne!(attributes[a]["TEXCOORD_1"], attributes[b]["TEXCOORD_1"]);
+    }
+}
+
+/// A floor under a sun, and a card over half of its width whose `material` and coordinates count; what the floor's
+/// texels show beneath the card's middle and beside the card, as a fraction of the sun.
+fn under_a_card(material: &Value, side: u32) -> (f64, f64) {
+    let result = bake_under_a_card(material, &json!({}), side);
+    shadow_of_the_card(&result)
+}
+
+/// The card's node has these `extras`.
+fn bake_under_a_card(material: &Value, extras: &Value, side: u32) -> BakeResult {
+    let mut draft = Draft::square();
+    let mut texels = Vec::new();
+    for k in 0..64 {
+        texels.push([0, 0, 0, if (k / 8 + k % 8) % 2 == 0 { 255 } else { 0 }]);
+    }
+    draft.texture_with_alpha(8, &texels);
+    draft.set("/materials/0", material.clone());
+    draft.set("/materials/-", json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}}));
+    let floor = [[-2.0, -2.0, -1.0], [3.0, -2.0, -1.0], [3.0, 3.0, -1.0], [-2.0, 3.0, -1.0]].concat();
+    let positions = draft.accessor("VEC3", FLOAT, &floats(&floor));
+    let indices = draft.json["meshes"][0]["primitives"][0]["indices"].clone();
+    draft.set(
+        "/meshes/-",
+        json!({"primitives": [{"attributes": {"POSITION": positions}, "indices": indices, "material": 1}]}),
+    );
+    draft.set("/nodes/-", json!({"mesh": 1}));
+    draft.set("/nodes/-", json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    draft.set("/scenes/0/nodes", json!([0, 2, 3]));
+    draft.set(
+        "/extensions",
+        json!({"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 10}]}}),
+    );
+    let mut options = sized(side);
+    options.density = cobake::options::DensityPolicy::Uniform;
+    draft.set("/nodes/1/extras", json!({"cobake": extras}));
+    bake_scene(&draft.scene(), &options, &mut Silent).expect("baked")
+}
+
+fn shadow_of_the_card(result: &BakeResult) -> (f64, f64) {
+    let surface = result.surfaces.iter().position(|s| s.area > 20.0).expect("a floor");
+    let at = |x: f64, y: f64| {
+        f64::from(lookup(result, surface, result.surfaces[surface].frame.project(DVec3::new(x, y, -1.0))).x)
+            / 10.0
+    };
+    let points = (0..64 * 64).map(|k| at((f64::from(k % 64) + 0.5) / 64.0, (f64::from(k / 64) + 0.5) / 64.0));
+    (points.sum::<f64>() / 4096.0, at(2.0, 2.0))
+}
+
+/// Half of a card's texels are clear in a checker, so that half of the sun passes; a blended card stops its alpha;
+/// an opaque one's alpha says nothing.
+#[test]
+fn cards_throw_the_shadows_of_their_alpha() {
+    let texture = json!({"index": 0});
+    let checker = json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorTexture": texture}});
+    let (mean, beside) = under_a_card(&checker, 256);
+    assert!((beside - 1.0).abs() < 0.002, "{beside} of the sun beside the card");
+    assert!((mean - 0.5).abs() < 0.02, "{mean} of the sun through a checker");
+
+    let veil = json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.25]}});
+    let (mean, beside) = under_a_card(&veil, 64);
+    // The outermost texels reach into the light.
+    assert!((beside - 1.0).abs() < 0.002 && (mean - 0.75).abs() < 0.03, "{mean} beneath, {beside} beside");
+
+    let solid = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.25]}});
+    assert!(under_a_card(&solid, 64).0 < 0.05);
+}
+
+/// A card without a lightmap still throws a shadow, and one that does not cast still has a lightmap.
+#[test]
+fn nodes_have_their_say() {
+    let solid = json!({"pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}});
+    let parts = |result: &BakeResult| {
+        let (json, _) = unpack(&result.glb);
+        let lit = |node: usize| json["nodes"][node]["extensions"]["COBAKE_lightmap"].is_object();
+        (lit(1), lit(2), shadow_of_the_card(result).0)
+    };
+    let unlit = bake_under_a_card(&solid, &json!({"bake": false}), 64);
+    let (card, floor, light) = parts(&unlit);
+    assert!(!card && floor && light < 0.05, "{card} {floor} {light}");
+    let (json, _) = unpack(&unlit.glb);
+    assert!(json["meshes"][0]["primitives"][0]["attributes"].get("TEXCOORD_1").is_none());
+    let (card, floor, light) = parts(&bake_under_a_card(&solid, &json!({"cast": false}), 64));
+    assert!(card && floor && (light - 1.0).abs() < 0.002, "{card} {floor} {light}");
+
+    let density = |extras: Value| {
+        let result = bake_under_a_card(&solid, &extras, 64);
+        let card = result.surfaces.iter().position(|s| s.area < 2.0).expect("a card");
+        let of = |surface: usize| {
+            result.atlas.charts_of(surface)[0].texel_from_plane.matrix2.determinant().abs().sqrt()
+        };
+        of(card) / of(1 - card)
+    };
+    let ratio = density(json!({"density": 4})) / density(json!({}));
+    assert!((ratio / 4.0 - 1.0).abs() < 0.15, "{ratio} times as dense");
+}

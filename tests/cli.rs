@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 32] = [
+const OPTIONS: [&str; 33] = [
     "--separate",
     "--for",
     "--exr",
@@ -24,6 +24,7 @@ const OPTIONS: [&str; 32] = [
     "--budget",
     "--size",
     "--texels-per-metre",
+    "--dynamic",
     "--threads",
     "--report",
     "--pictures",

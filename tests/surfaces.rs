@@ -41,6 +41,7 @@ impl Model {
             triangles: first_triangle..self.triangles.len(),
             vertices: first_vertex..self.vertices.len(),
             mirrored: false,
+            settings: cobake::scene::NodeSettings::default(),
         });
         self.double_sided.push(false);
         self

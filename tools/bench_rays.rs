@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut stack = FanStack::default();
         let as_fans = rate(count, || {
             for (origin, axes) in &places {
-                tracer.look(*origin, *axes, fans, &mut stack, |hit, _| {
+                tracer.look(*origin, *axes, fans, &mut stack, |hit, _, _| {
                     black_box(hit);
                 });
             }
@@ -66,7 +66,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     });
     let as_fans = rate(count, || {
         for (i, (origin, _)) in places.iter().enumerate() {
-            black_box(tracer.occluded_all(*origin, to(i), &mut stack));
+            black_box(tracer.arriving_all(*origin, to(i), &mut stack));
         }
     });
     let name = "shadow rays to 16 near points";

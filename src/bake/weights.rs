@@ -6,6 +6,9 @@ use crate::options::{BakeOptions, OptionsError};
 use crate::scene::Scene;
 use crate::surface::Surface;
 
+/// What gets no lightmap still takes a little of the page: as little as there is.
+const UNLIT: f64 = 1.0 / 64.0;
+
 /// For each surface how many times as dense as else its texels lie: what its node was given.
 ///
 /// # Errors
@@ -21,8 +24,11 @@ pub(super) fn of_surfaces(
         return Err(OptionsError { option: "node-density", value: node as f64, range });
     }
     let of = |surface: &Surface| {
-        let node = scene.placements.get(surface.placement).map(|placement| placement.node);
-        node.and_then(|node| options.node_density.get(&node)).copied().unwrap_or(1.0)
+        let Some(placement) = scene.placements.get(surface.placement) else { return 1.0 };
+        if !placement.settings.bake {
+            return UNLIT;
+        }
+        options.node_density.get(&placement.node).copied().unwrap_or(placement.settings.density)
     };
     Ok(surfaces.iter().map(of).collect())
 }

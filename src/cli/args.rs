@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cobake::options::{
-    BakeOptions, CobHeight, DensityPolicy, Direct, Preview, Quantity, Refine, Resolution, Toggle, Topology,
+    BakeOptions, CobHeight, DensityPolicy, Direct, Dynamic, Preview, Quantity, Refine, Resolution, Toggle,
+    Topology,
 };
 
 use super::bytes;
@@ -77,6 +78,10 @@ pub(crate) struct BakeArgs {
     /// Which of the document's scenes to bake [default: its default scene]
     #[arg(long, value_name = "INDEX")]
     scene: Option<usize>,
+
+    /// What becomes of meshes that move by animation, skin or morph targets; none gets a lightmap
+    #[arg(long, value_enum, default_value_t = DynamicWord::Ignore)]
+    dynamic: DynamicWord,
 
     /// Worker threads, 0 to 1024; 0 takes one per core. The result does not depend on it
     #[arg(long, value_name = "N", default_value_t = BakeOptions::default().threads)]
@@ -202,6 +207,14 @@ enum DirectWord {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+enum DynamicWord {
+    /// They are left out
+    Ignore,
+    /// They throw shadows from where they rest
+    Cast,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum TopologyWord {
     /// The input's own triangles with a second set of texture coordinates
     Source,
@@ -262,6 +275,15 @@ impl From<DirectWord> for Direct {
         match word {
             DirectWord::Mesh => Self::Mesh,
             DirectWord::Texel => Self::Texel,
+        }
+    }
+}
+
+impl From<DynamicWord> for Dynamic {
+    fn from(word: DynamicWord) -> Self {
+        match word {
+            DynamicWord::Ignore => Self::Ignore,
+            DynamicWord::Cast => Self::Cast,
         }
     }
 }
@@ -341,6 +363,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.padding = args.padding;
         options.mips = args.mips;
         options.scene = args.scene;
+        options.dynamic = args.dynamic.into();
         options
     }
 }
@@ -374,7 +397,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --scene 1",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --scene 1 --dynamic cast",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -394,6 +417,7 @@ mod tests {
         meant.padding = Some(2);
         meant.mips = 3;
         meant.scene = Some(1);
+        meant.dynamic = Dynamic::Cast;
         assert_eq!(typed, meant);
     }
 

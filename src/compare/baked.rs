@@ -66,7 +66,7 @@ impl BakedScene {
     /// Where the file is no scene, holds no lightmap of cobake's, or a damaged one.
     pub fn load(path: &Path, scene: Option<usize>) -> Result<Self, CompareError> {
         let unreadable = |source| CompareError::Scene { path: path.to_owned(), source };
-        let scene = load(path, &ImportOptions { scene }).map_err(unreadable)?;
+        let scene = load(path, &ImportOptions { scene, ..ImportOptions::default() }).map_err(unreadable)?;
         let extension = scene.source.json.get("extensions").and_then(|e| e.get(COBAKE_LIGHTMAP));
         let lightmaps = extension.and_then(|e| e.get("lightmaps")?.as_array()).filter(|l| !l.is_empty());
         let lightmaps = lightmaps.ok_or_else(|| CompareError::NotBaked { path: path.to_owned() })?;

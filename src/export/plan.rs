@@ -47,7 +47,7 @@ impl Plan {
         let mut nodes: Vec<LitNode> = Vec::new();
         let mut by_node = BTreeMap::new();
         for (index, placement) in baked.scene.placements.iter().enumerate() {
-            if placement.triangles.is_empty() {
+            if placement.triangles.is_empty() || !placement.settings.bake {
                 continue;
             }
             let slot = *by_node.entry(placement.node).or_insert(nodes.len());

@@ -22,7 +22,7 @@ use crate::geom::{Bounds, Frame, Ring};
 use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
-use crate::solve::umbra::Occluders;
+use crate::solve::umbra::{Occluder, Occluders};
 use crate::surface::Surface;
 use crate::trace::Tracer;
 use crate::unwrap::Chart;
@@ -444,7 +444,7 @@ impl Shining<'_> {
 
     /// A small block in which shadow may fall: one point a texel where the light changes little from texel
     /// to texel; where it changes much, the mean over several, and these as samples to be fitted.
-    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[&[DVec3]]) -> Done {
+    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[Occluder]) -> Done {
         let mut evaluation = Evaluation::new(Precision::TEXEL);
         let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
         for texel in texels.iter_mut() {
@@ -495,7 +495,7 @@ impl Shining<'_> {
     fn sample(
         &self,
         texel: &LitTexel,
-        between: &[&[DVec3]],
+        between: &[Occluder],
         outlines: &[[DVec2; 2]],
         (evaluation, samples): (&mut Evaluation, &mut Vec<LightSample>),
     ) {

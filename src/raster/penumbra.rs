@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 use crate::geom::Bounds;
 use crate::light::luminance;
 use crate::solve::emitter::Emitter;
+use crate::solve::umbra::Occluder;
 
 /// A penumbra has to be wider than this fraction of the block's diagonal: samples lie half a side apart.
 const WIDTH: f64 = 0.5;
@@ -23,13 +24,13 @@ const DIM: f64 = 0.5;
 const LIKELY: f64 = 0.2;
 
 /// Whether the shadows of all `occluders` are wide against the block with corners `hull`.
-pub(super) fn is_soft(hull: &[DVec3; 4], emitter: &Emitter, occluders: &[&[DVec3]], diagonal: f64) -> bool {
+pub(super) fn is_soft(hull: &[DVec3; 4], emitter: &Emitter, occluders: &[Occluder], diagonal: f64) -> bool {
     let Some(width) = emitter.width() else { return false };
     let block = Bounds::of(*hull);
     let (centre, size) = (block.centre(), block.diagonal());
     let to_emitter = emitter.centre(centre, diagonal).distance(centre);
     occluders.iter().all(|occluder| {
-        let bounds = Bounds::of(occluder.iter().copied());
+        let bounds = Bounds::of(occluder.corners.iter().copied());
         let near = (bounds.distance(centre) - 0.5 * size).max(0.0);
         near >= to_emitter || width * near >= WIDTH * size * (to_emitter - near)
     })

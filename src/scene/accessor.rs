@@ -104,6 +104,15 @@ impl Role {
         Self { name: "JOINTS", shapes: &[Shape::Vec4], components: &[Component::U8, Component::U16] };
     pub(super) const WEIGHTS: Self =
         Self { name: "WEIGHTS", shapes: &[Shape::Vec4], components: Component::QUANTIZED };
+    pub(super) const TRANSLATION: Self =
+        Self { name: "TRANSLATION", shapes: &[Shape::Vec3], components: &[Component::F32] };
+    pub(super) const ROTATION: Self = Self {
+        name: "ROTATION",
+        shapes: &[Shape::Vec4],
+        components: &[Component::F32, Component::I8, Component::I16],
+    };
+    pub(super) const SCALE: Self =
+        Self { name: "SCALE", shapes: &[Shape::Vec3], components: &[Component::F32] };
     pub(super) const MATRICES: Self =
         Self { name: "inverse bind matrices", shapes: &[Shape::Mat4], components: &[Component::F32] };
 }
@@ -208,6 +217,11 @@ impl Numbers {
     /// How many elements there are.
     pub(super) fn len(&self) -> usize {
         self.values.len() / self.width
+    }
+
+    /// Components of an element.
+    pub(super) fn components(&self) -> usize {
+        self.width
     }
 
     /// The elements as arrays of their first `N` components; missing components read as zero.

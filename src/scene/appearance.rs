@@ -15,7 +15,7 @@ use super::texture::{Binding, Place};
 #[derive(Debug, Default)]
 pub struct Appearance {
     /// By [`Binding::texture`]; `None` where the image could not be read.
-    pub(super) textures: Vec<Option<Pyramid>>,
+    pub(super) textures: Vec<Option<Arc<Pyramid>>>,
     /// One entry a material of the scene.
     pub(super) materials: Vec<Layers>,
     /// One entry a placement.
@@ -29,6 +29,8 @@ pub(super) struct Attributes {
     pub(super) texture_coordinates: Vec<(u32, Vec<Vec2>)>,
     /// `COLOR_0`, linear, unless it is white.
     pub(super) colours: Option<Vec<Vec3>>,
+    /// The alpha of `COLOR_0`, unless it is 1.
+    pub(super) alphas: Option<Vec<f32>>,
 }
 
 /// A material's factors and textures: `reflectance = base * (1 - specular)`.
@@ -41,6 +43,18 @@ pub(super) struct Layers {
     pub(super) specular_texture: Option<(Binding, Channel)>,
     pub(super) emission: DVec3,
     pub(super) emission_texture: Option<Binding>,
+    /// What is there of the surface; `None` where all of it is.
+    pub(super) alpha: Option<Alpha>,
+}
+
+/// How much of a surface is there: `factor * texture * COLOR_0`'s alpha.
+#[derive(Clone, Debug)]
+pub(super) struct Alpha {
+    pub(super) factor: f64,
+    pub(super) texture: Option<Binding>,
+    /// The surface is there where its alpha is at least this (`alphaMode` `MASK`); without, alpha is the share of the
+    /// light that it stops (`BLEND`).
+    pub(super) cutoff: Option<f64>,
 }
 
 /// What a texture says about the specular share.
@@ -90,7 +104,7 @@ impl Appearance {
 
     /// A texture that could be read.
     pub(super) fn texture(&self, binding: &Binding) -> Option<&Pyramid> {
-        self.textures.get(binding.texture).and_then(Option::as_ref)
+        self.textures.get(binding.texture).and_then(Option::as_deref)
     }
 }
 

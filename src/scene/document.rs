@@ -58,7 +58,14 @@ pub(super) struct NodeExtensions {
     #[serde(rename = "KHR_lights_punctual")]
     pub(super) light: Option<LightReference>,
     #[serde(rename = "EXT_mesh_gpu_instancing")]
-    pub(super) instancing: Option<IgnoredAny>,
+    pub(super) instancing: Option<Instancing>,
+}
+
+/// A node's instances: accessors by attribute.
+#[derive(Debug, Deserialize)]
+pub(super) struct Instancing {
+    #[serde(default)]
+    pub(super) attributes: std::collections::BTreeMap<String, usize>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -183,6 +190,7 @@ pub(super) struct MaterialEntry {
     pub(super) emissive_factor: Option<[f64; 3]>,
     pub(super) emissive_texture: Option<TextureInfo>,
     pub(super) alpha_mode: Option<String>,
+    pub(super) alpha_cutoff: Option<f64>,
     #[serde(default)]
     pub(super) double_sided: bool,
     #[serde(default)]

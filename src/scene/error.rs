@@ -175,6 +175,30 @@ pub enum ImportError {
         length: usize,
     },
 
+    /// A compressed buffer view cannot be decoded.
+    #[error(
+        "{view}, compressed by EXT_meshopt_compression, {fault}; compress the file again from its source"
+    )]
+    Meshopt {
+        /// The buffer view.
+        view: Item,
+        /// Why.
+        fault: &'static str,
+    },
+
+    /// Attributes of one node's instances that differ in length.
+    #[error("{node} has {count} values of {attribute} for {instances} instances; export the file again")]
+    InstanceLength {
+        /// The node.
+        node: Item,
+        /// The attribute.
+        attribute: String,
+        /// Its length.
+        count: usize,
+        /// The number of instances.
+        instances: usize,
+    },
+
     /// An accessor cannot be read.
     #[error("{accessor} {fault}")]
     Accessor {
@@ -276,9 +300,36 @@ pub enum ImportError {
         limit: usize,
     },
 
+    /// A node's `extras.cobake` that cannot be followed.
+    #[error(
+        "{node} has extras.cobake{} = {value}, which must be {expected}; correct it or take it out",
+        dotted(key)
+    )]
+    Setting {
+        /// The node.
+        node: Item,
+        /// The setting; empty for all of them.
+        key: String,
+        /// What was found.
+        value: String,
+        /// What it may be.
+        expected: &'static str,
+    },
+
+    /// Triangles, but none that can hold a lightmap.
+    #[error(
+        "no mesh of the scene can hold a lightmap: all move (animation, skin or morph targets) or say \
+         extras.cobake.bake = false; add one that stands still"
+    )]
+    NothingToLight,
+
     /// Nothing to bake.
     #[error("the scene holds no triangles; export its meshes, or choose another of the file's scenes")]
     NoTriangles,
+}
+
+fn dotted(key: &str) -> String {
+    if key.is_empty() { String::new() } else { format!(".{key}") }
 }
 
 fn scenes_there_are(count: usize) -> String {

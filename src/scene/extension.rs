@@ -4,12 +4,14 @@
 //! honoured there is refused by name. What is merely used is passed over, with a warning where that
 //! changes the light.
 
+use serde_json::Value;
+
 use super::ImportError;
 use super::document::Document;
-use super::warning::Warnings;
 
 /// Honoured, or without effect on diffuse light.
-const HONOURED: [&str; 6] = [
+const HONOURED: [&str; 7] = [
+    "EXT_mesh_gpu_instancing",
     "KHR_animation_pointer",
     "KHR_lights_punctual",
     "KHR_mesh_quantization",
@@ -22,14 +24,13 @@ const HONOURED: [&str; 6] = [
 const HONOURED_FAMILY: &str = "KHR_materials_";
 
 /// Extensions that are refused where they are required, and what to do.
-const REMEDIES: [(&str, &str); 8] = [
+const REMEDIES: [(&str, &str); 7] = [
     ("EXT_meshopt_compression", DECOMPRESS),
     ("KHR_meshopt_compression", DECOMPRESS),
     ("KHR_draco_mesh_compression", DECOMPRESS),
     ("KHR_texture_basisu", "decode its textures first: npx @gltf-transform/cli ktxdecompress in.glb out.glb"),
     ("EXT_texture_webp", "store its textures as PNG first: npx @gltf-transform/cli png in.glb out.glb"),
     ("EXT_texture_avif", "store its textures as PNG first: npx @gltf-transform/cli png in.glb out.glb"),
-    ("EXT_mesh_gpu_instancing", "export the instances as nodes that share a mesh"),
     ("KHR_node_visibility", "export the scene without it, hidden nodes left out"),
 ];
 
@@ -48,18 +49,22 @@ pub(super) fn refusal(name: &str) -> ImportError {
     ImportError::RequiredExtension { name: name.to_owned(), remedy }
 }
 
-/// Warns of used extensions whose absence changes the scene.
-pub(super) fn warn_of_used(document: &Document, warnings: &mut Warnings) {
-    for (index, node) in document.nodes.iter().enumerate() {
-        if node.extensions.instancing.is_some() && node.mesh.is_some() {
-            warnings.about(
-                document.node_item(index),
-                "EXT_mesh_gpu_instancing is not expanded, one copy is baked; export the instances as nodes",
-            );
+/// Takes `names` out of the document's lists of extensions.
+pub(super) fn forget(json: &mut Value, names: &[&str]) {
+    let Some(root) = json.as_object_mut() else { return };
+    for key in ["extensionsUsed", "extensionsRequired"] {
+        let Some(list) = root.get_mut(key).and_then(Value::as_array_mut) else { continue };
+        list.retain(|entry| !names.iter().any(|name| entry == name));
+        if list.is_empty() {
+            root.shift_remove(key); // glTF allows no empty list
         }
     }
 }
 
 fn is_honoured(name: &str) -> bool {
+    #[cfg(feature = "meshopt")]
+    if super::meshopt::NAMES.contains(&name) {
+        return true;
+    }
     name.starts_with(HONOURED_FAMILY) || HONOURED.contains(&name)
 }

@@ -1,6 +1,7 @@
 //! From a file to a scene: the stage's parts in order.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -12,7 +13,10 @@ use super::pyramid::Pyramid;
 use super::texture::Request;
 use super::warning::Warnings;
 use super::{ImportError, Item, Material, PunctualLight, Scene, SourceDocument};
-use super::{container, extension, hierarchy, material, place, punctual, source, texture, uri};
+use super::{
+    container, extension, hierarchy, instancing, material, place, punctual, settings, source, texture, uri,
+};
+use crate::options::Dynamic;
 
 /// What an import can be told.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,6 +24,8 @@ pub struct ImportOptions {
     /// Which of the document's scenes to read, by index. Default: the document's own default, else its
     /// first; all root nodes where the document has no scenes.
     pub scene: Option<usize>,
+    /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
+    pub dynamic: Dynamic,
 }
 
 /// Reads the scene in the `.glb` or `.gltf` file at `path`.
@@ -48,21 +54,26 @@ pub fn load(path: &Path, options: &ImportOptions) -> Result<Scene, ImportError> 
 /// As [`load`].
 pub fn from_bytes(bytes: &[u8], base: Option<&Path>, options: &ImportOptions) -> Result<Scene, ImportError> {
     let container = container::split(bytes)?;
-    let json = serde_json::from_slice(container.json).map_err(|source| ImportError::Json { source })?;
-    let document = Document::read(&json)?;
+    let mut json = serde_json::from_slice(container.json).map_err(|source| ImportError::Json { source })?;
+    let mut document = Document::read(&json)?;
     let mut warnings = Warnings::default();
     extension::check_required(&document)?;
-    extension::warn_of_used(&document, &mut warnings);
+    #[cfg_attr(not(feature = "meshopt"), expect(unused_mut, reason = "nothing is decoded"))]
+    let mut buffers = source::read_buffers(&document, container.binary, base)?;
+    #[cfg(feature = "meshopt")]
+    if super::meshopt::decode(&mut json, &mut buffers)? {
+        document = Document::read(&json)?;
+    }
+    if instancing::expand(&mut json, &document, &buffers)? {
+        document = Document::read(&json)?;
+    }
 
     let nodes = hierarchy::traverse(&document, options.scene, &mut warnings)?;
-    let buffers = source::read_buffers(&document, container.binary, base)?;
     let external_images = source::read_images(&document, base, &mut warnings);
     let accessors = Accessors { document: &document, buffers: &buffers };
     let sets = |material| material::texture_coordinate_sets(&document, material);
-    let placed = place::place(accessors, &nodes, &sets, &mut warnings)?;
-    if placed.triangles.is_empty() {
-        return Err(ImportError::NoTriangles);
-    }
+    let settings = settings::of_nodes(&json, &document, &nodes, &mut warnings)?;
+    let placed = place::place(accessors, &nodes, (&settings, options.dynamic), &sets, &mut warnings)?;
 
     let used = materials_in_use(&document, &placed);
     let palette = material::read(&document, &used, &mut warnings)?;
@@ -88,7 +99,7 @@ fn decode_all(
     source: &SourceDocument,
     requests: &[Request],
     warnings: &mut Warnings,
-) -> Result<Vec<Option<Pyramid>>, ImportError> {
+) -> Result<Vec<Option<Arc<Pyramid>>>, ImportError> {
     let decode = |request: &Request| {
         let bytes = source::image_bytes(document, source, request.image)?;
         Ok(bytes.map(|bytes| texture::decode(bytes, request.encoding)))
@@ -99,7 +110,7 @@ fn decode_all(
         let image = document.images.get(request.image);
         let item = Item::new("image", request.image, image.and_then(|image| image.name.as_deref()));
         textures.push(match decoded {
-            Some(Ok(pyramid)) => Some(pyramid),
+            Some(Ok(pyramid)) => Some(Arc::new(pyramid)),
             Some(Err(fault)) => {
                 let text =
                     format!("cannot be decoded ({fault}); materials that use it keep their factors alone");

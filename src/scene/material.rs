@@ -7,11 +7,11 @@
 //! - `KHR_materials_unlit` surfaces neither receive light nor send any out; they only block it.
 //! - a primitive without material is a white diffuse one: nothing was said about it, and the metal
 //!   that glTF's defaults make of it would bake black.
-//! - transparency is left out: every surface is opaque.
+//! - `alphaMode` makes surfaces stop less light, see `coverage`; an unlit one's too. Transmission is left out.
 
 use glam::DVec3;
 
-use super::appearance::{Appearance, Channel, Layers};
+use super::appearance::{Alpha, Appearance, Channel, Layers};
 use super::document::{Document, MaterialEntry, SpecularGlossiness, TextureInfo};
 use super::texture::{Binding, Encoding, Request, bind};
 use super::warning::Warnings;
@@ -53,7 +53,8 @@ pub(super) fn texture_coordinate_sets(document: &Document, index: usize) -> Vec<
     let set = |info: &TextureInfo| {
         info.extensions.transform.as_ref().and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord)
     };
-    let mut sets: Vec<u32> = textures(entry).into_iter().flatten().map(set).collect();
+    let alpha = base_texture(entry).filter(|_| is_see_through(entry));
+    let mut sets: Vec<u32> = textures(entry).into_iter().chain([alpha]).flatten().map(set).collect();
     sets.sort_unstable();
     sets.dedup();
     sets
@@ -94,6 +95,18 @@ fn textures(entry: &MaterialEntry) -> [Option<&TextureInfo>; 3] {
             [core.base_color_texture.as_ref(), core.metallic_roughness_texture.as_ref(), emission]
         }
     }
+}
+
+/// The texture of the base colour, whose alpha counts on unlit materials too.
+fn base_texture(entry: &MaterialEntry) -> Option<&TextureInfo> {
+    match &entry.extensions.specular_glossiness {
+        Some(old) => old.diffuse_texture.as_ref(),
+        None => entry.pbr_metallic_roughness.base_color_texture.as_ref(),
+    }
+}
+
+fn is_see_through(entry: &MaterialEntry) -> bool {
+    matches!(entry.alpha_mode.as_deref(), Some("MASK" | "BLEND"))
 }
 
 struct Reader<'a> {
@@ -156,6 +169,17 @@ impl Reader<'_> {
         layers.specular_texture = specular.map(|binding| (binding, channel.1));
         layers.emission_texture =
             self.bind(emission.filter(|_| layers.emission != DVec3::ZERO), Encoding::Srgb)?;
+        if is_see_through(entry) {
+            let factor = match &entry.extensions.specular_glossiness {
+                Some(old) => old.diffuse_factor,
+                None => entry.pbr_metallic_roughness.base_color_factor,
+            };
+            let texture = self.bind(base_texture(entry), Encoding::Alpha)?;
+            let cutoff = entry.alpha_cutoff.unwrap_or(0.5);
+            let cutoff = (entry.alpha_mode.as_deref() == Some("MASK")).then_some(cutoff);
+            layers.alpha =
+                Some(Alpha { factor: factor.map_or(1.0, |[_, _, _, alpha]| alpha), texture, cutoff });
+        }
         Ok(())
     }
 
@@ -176,9 +200,6 @@ impl Reader<'_> {
         if entry.extensions.unlit.is_some() {
             let text = "KHR_materials_unlit, so it blocks light and neither reflects nor emits any";
             return self.warnings.about(item, text);
-        }
-        if matches!(entry.alpha_mode.as_deref(), Some("MASK" | "BLEND")) {
-            self.warnings.about(&item, "its transparency (alphaMode) is not baked; the surface is opaque");
         }
         if entry.extensions.transmission.is_some() || entry.extensions.diffuse_transmission.is_some() {
             self.warnings.about(&item, "its light transmission is not baked; the surface is opaque");

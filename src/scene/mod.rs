@@ -5,9 +5,10 @@
 //! stage alone opens again.
 //!
 //! The order of work: `container` splits the file, `document` types its JSON, `extension` refuses
-//! what cannot be honoured, `source` reads buffers and images, `hierarchy` finds the nodes' places,
+//! what cannot be honoured, `source` reads buffers and images, `meshopt` decodes and `instancing` expands
+//! what the document holds in short, `hierarchy` finds the nodes' places,
 //! `place` puts `primitive`s there (through `accessor`s), `material` and `punctual` read what
-//! shines and reflects, and `appearance` answers what a point looks like (`texture`, `pyramid`).
+//! shines and reflects, and `appearance` and `coverage` answer what a point looks like and how much of it is there (`texture`, `pyramid`).
 //!
 //! Every index, offset and length is checked where it is followed; nothing is allocated by a count
 //! alone. What is wrong is an [`ImportError`]; what is merely odd is a warning.
@@ -16,17 +17,22 @@ mod accessor;
 mod appearance;
 mod container;
 mod coordinates;
+mod coverage;
 mod document;
 mod error;
 mod extension;
 mod hierarchy;
+mod instancing;
 mod item;
 mod load;
 mod material;
+#[cfg(feature = "meshopt")]
+mod meshopt;
 mod place;
 mod primitive;
 mod punctual;
 mod pyramid;
+mod settings;
 mod source;
 mod texture;
 mod uri;
@@ -34,9 +40,11 @@ mod warning;
 
 pub use accessor::AccessorFault;
 pub use appearance::Appearance;
+pub use coverage::Coverage;
 pub use error::ImportError;
 pub use item::Item;
 pub use load::{ImportOptions, from_bytes, load};
+pub use settings::NodeSettings;
 pub use uri::UriError;
 pub(crate) use uri::percent_decode;
 
@@ -87,7 +95,7 @@ pub struct Triangle {
 }
 
 /// A primitive as a node places it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     /// Index into the document's `nodes`.
     pub node: usize,
@@ -104,6 +112,8 @@ pub struct Placement {
     /// Whether the node's transform mirrors, so that corners 1 and 2 of each triangle are swapped
     /// against the source's order.
     pub mirrored: bool,
+    /// How it takes part in the bake. What moves has `bake` off.
+    pub settings: NodeSettings,
 }
 
 /// What a surface does with light. Textures are reached through [`Scene::reflectance_at`]

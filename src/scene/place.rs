@@ -11,8 +11,9 @@ use super::document::{Document, Node, follow};
 use super::hierarchy::{PlacedNode, is_invertible};
 use super::primitive::{Geometry, PrimitiveReader, influences, material};
 use super::warning::Warnings;
-use super::{ImportError, Item, MAX_COORDINATE, MAX_COUNT, Placement, Triangle};
+use super::{ImportError, Item, MAX_COORDINATE, MAX_COUNT, NodeSettings, Placement, Triangle};
 use crate::geom::triangle::area_normal;
+use crate::options::Dynamic;
 
 /// A triangle counts as without area where its height is below this share of its longest edge.
 const FLAT: f64 = 1e-12;
@@ -32,16 +33,24 @@ pub(super) struct Placed {
 pub(super) fn place(
     accessors: Accessors<'_>,
     nodes: &[PlacedNode],
+    (settings, dynamic): (&[NodeSettings], Dynamic),
     sets: &dyn Fn(usize) -> Vec<u32>,
     warnings: &mut Warnings,
 ) -> Result<Placed, ImportError> {
     let worlds = nodes.iter().map(|node| (node.index, node.world)).collect();
-    let mut placer =
-        Placer { accessors, worlds, sets, cache: BTreeMap::new(), placed: Placed::default(), warnings };
+    let (cache, placed) = (BTreeMap::new(), Placed::default());
+    let mut placer = Placer { accessors, worlds, sets, cache, placed, dynamic, left_out: false, warnings };
     for node in nodes {
-        placer.node(*node)?;
+        let settings = settings.get(node.index).copied().unwrap_or_default();
+        placer.node(*node, settings)?;
     }
-    Ok(placer.placed)
+    let Placer { placed, left_out, .. } = placer;
+    let is_lit = placed.placements.iter().any(|placement| placement.settings.bake);
+    match (placed.triangles.is_empty() && !left_out, is_lit) {
+        (true, _) => Err(ImportError::NoTriangles),
+        (false, false) => Err(ImportError::NothingToLight),
+        (false, true) => Ok(placed),
+    }
 }
 
 struct Placer<'a> {
@@ -51,6 +60,9 @@ struct Placer<'a> {
     /// Primitives read before, by mesh and primitive.
     cache: BTreeMap<(usize, usize), Option<Arc<Geometry>>>,
     placed: Placed,
+    dynamic: Dynamic,
+    /// Whether something was left out because it moves.
+    left_out: bool,
     warnings: &'a mut Warnings,
 }
 
@@ -60,25 +72,37 @@ struct Spot<'a> {
     entry: &'a Node,
     mesh: usize,
     primitive: usize,
+    settings: NodeSettings,
 }
 
 impl<'a> Placer<'a> {
-    fn node(&mut self, node: PlacedNode) -> Result<(), ImportError> {
+    fn node(&mut self, node: PlacedNode, mut settings: NodeSettings) -> Result<(), ImportError> {
         let document = self.accessors.document;
         let item = || document.node_item(node.index);
         let Some(entry) = document.nodes.get(node.index) else { return Ok(()) };
         let Some(mesh) = entry.mesh else { return Ok(()) };
         let primitives = &follow(&document.meshes, mesh, "mesh", item)?.primitives;
-        if primitives.iter().any(|primitive| !primitive.targets.is_empty()) {
-            self.warnings.about(item(), "it can be morphed; the shape at its default weights is baked");
+        if settings.is_dynamic && self.dynamic == Dynamic::Ignore {
+            self.left_out = true;
+            self.warnings.about(
+                item(),
+                "it moves (animation, skin or morph targets) and is left out; --dynamic cast bakes the shadow of its \
+                 rest pose",
+            );
+            return Ok(());
         }
-        if entry.skin.is_some() {
-            self.warnings.about(item(), "it is skinned; its rest pose is baked");
-        } else if !is_invertible(&node.world) {
+        if settings.is_dynamic {
+            settings.bake = false;
+            self.warnings.about(
+                item(),
+                "it moves (animation, skin or morph targets), so it gets no lightmap; its rest pose throws shadows",
+            );
+        }
+        if entry.skin.is_none() && !is_invertible(&node.world) {
             return Err(ImportError::Transform { node: item() });
         }
         for primitive in 0..primitives.len() {
-            self.primitive(&Spot { node, entry, mesh, primitive })?;
+            self.primitive(&Spot { node, entry, mesh, primitive, settings })?;
         }
         Ok(())
     }
@@ -128,6 +152,7 @@ impl<'a> Placer<'a> {
             triangles: triangles..self.placed.triangles.len(),
             vertices: vertices..self.placed.vertices.len(),
             mirrored,
+            settings: spot.settings,
         });
         Ok(())
     }

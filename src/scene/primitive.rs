@@ -160,7 +160,7 @@ impl PrimitiveReader<'_> {
             let values = numbers.arrays().map(|[u, v]| Vec2::new(u as f32, v as f32)).collect();
             texture_coordinates.push((set, values));
         }
-        let mut colours = None;
+        let (mut colours, mut alphas) = (None, None);
         if let Some(&accessor) = primitive.attributes.get("COLOR_0") {
             let numbers = self.accessors.read(accessor, &Role::COLOR, item)?;
             check_length(&numbers, "COLOR_0", count, item)?;
@@ -168,8 +168,12 @@ impl PrimitiveReader<'_> {
                 numbers.arrays().map(|[r, g, b]| Vec3::new(r as f32, g as f32, b as f32)).collect();
             // White changes nothing, and most exported vertex colours are white.
             colours = Some(values).filter(|values| values.iter().any(|&colour| colour != Vec3::ONE));
+            if numbers.components() == 4 {
+                let values: Vec<f32> = numbers.arrays().map(|[_, _, _, alpha]| alpha as f32).collect();
+                alphas = Some(values).filter(|values| values.iter().any(|alpha| *alpha < 1.0));
+            }
         }
-        Ok(Attributes { texture_coordinates, colours })
+        Ok(Attributes { texture_coordinates, colours, alphas })
     }
 }
 

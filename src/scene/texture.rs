@@ -21,6 +21,8 @@ pub(super) enum Encoding {
     Srgb,
     /// Anything else, as they stand.
     Linear,
+    /// The alpha channel alone, in all three channels; 1 where the image has none.
+    Alpha,
 }
 
 /// An image that a material needs.
@@ -150,11 +152,16 @@ pub(super) fn decode(bytes: &[u8], encoding: Encoding) -> Result<Pyramid, image:
         let parameter = image::error::ParameterErrorKind::DimensionMismatch;
         return Err(image::ImageError::Parameter(image::error::ParameterError::from_kind(parameter)));
     }
+    if encoding == Encoding::Alpha {
+        let texels = image.into_rgba32f();
+        let alpha = |x: usize, y: usize| Vec3::splat(texels.get_pixel(x as u32, y as u32).0[3]);
+        return Ok(Pyramid::new(width, height, alpha));
+    }
     let pyramid = if image.color().bytes_per_pixel() > image.color().channel_count() {
         let texels = image.into_rgb32f();
         let at = |x: usize, y: usize| Vec3::from_array(texels.get_pixel(x as u32, y as u32).0);
         match encoding {
-            Encoding::Linear => Pyramid::new(width, height, at),
+            Encoding::Linear | Encoding::Alpha => Pyramid::new(width, height, at),
             Encoding::Srgb => {
                 Pyramid::new(width, height, |x, y| Vec3::from_array(at(x, y).to_array().map(linear)))
             }
@@ -182,6 +189,6 @@ fn byte_table(encoding: Encoding) -> &'static [f32; 256] {
     let fraction = |byte: usize| byte as f32 / 255.0;
     match encoding {
         Encoding::Srgb => SRGB.get_or_init(|| std::array::from_fn(|byte| linear(fraction(byte)))),
-        Encoding::Linear => LINEAR.get_or_init(|| std::array::from_fn(fraction)),
+        Encoding::Linear | Encoding::Alpha => LINEAR.get_or_init(|| std::array::from_fn(fraction)),
     }
 }

@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::form_factor::{SurfacePoint, signed_point_to_polygon};
+use super::umbra::Occluder;
 use super::visible::{ConvexParts, Workspace, visible_form_factor};
 use crate::geom::hull::convex_hull;
 use crate::geom::{Bounds, Frame};
@@ -69,13 +70,13 @@ pub enum Between<'a> {
     /// Nothing: the shaft is empty.
     Nothing,
     /// These convex polygons at most.
-    Polygons(&'a [&'a [DVec3]]),
+    Polygons(&'a [Occluder<'a>]),
 }
 
 impl<'a> Between<'a> {
     /// These polygons, or nothing where there are none.
     #[must_use]
-    pub fn of(polygons: &'a [&'a [DVec3]]) -> Self {
+    pub fn of(polygons: &'a [Occluder<'a>]) -> Self {
         if polygons.is_empty() { Self::Nothing } else { Self::Polygons(polygons) }
     }
 }
@@ -156,18 +157,24 @@ impl AreaEmitter {
         &self,
         receiver: SurfacePoint,
         tracer: &Tracer,
-        between: &[&[DVec3]],
+        between: &[Occluder],
         e: &mut Evaluation,
     ) -> f64 {
-        if between.len() <= e.precision.exact_occluders {
+        let solid = between.iter().filter(|occluder| !occluder.is_screen);
+        if solid.clone().count() <= e.precision.exact_occluders {
             let parts = ConvexParts {
                 parts: &self.parts,
                 normal: self.frame.normal,
                 origin: self.frame.origin,
                 margin: tracer.margin() * 0.5,
             };
-            let occluders = between.iter().copied();
+            let has_screens = between.iter().any(|occluder| occluder.is_screen);
+            let occluders = solid.map(|occluder| occluder.corners);
             if let Some(f) = visible_form_factor(receiver, parts, occluders, &mut e.workspace) {
+                if has_screens && f > 0.0 {
+                    e.effort.by_rays += 1;
+                    return f * self.share_through_screens(receiver, tracer, e);
+                }
                 e.effort.exact += 1;
                 return f;
             }
@@ -204,7 +211,7 @@ impl Emitter {
                         evaluation.effort.by_rays += 1;
                         evaluation.effort.rays += 1;
                         let to = self.toward(receiver.position, tracer.diagonal());
-                        if tracer.occluded(receiver.position, to) { DVec3::ZERO } else { irradiance }
+                        irradiance * tracer.sight(receiver.position, to).arriving()
                     }
                     _ => {
                         evaluation.effort.unoccluded += 1;
@@ -416,7 +423,8 @@ mod tests {
         let lamp = lamp();
         let mut e = Evaluation::new(Precision::EMITTER);
         for x in [-0.6, 0.0, 0.3, 0.6] {
-            let exact = lamp.visible(floor_point(x), &tracer, &[&blocker], &mut e);
+            let occluder = Occluder { corners: &blocker, is_screen: false };
+            let exact = lamp.visible(floor_point(x), &tracer, &[occluder], &mut e);
             let rays =
                 lamp.unoccluded(floor_point(x)) * lamp.fraction_by_rays(floor_point(x), &tracer, &mut e);
             // 64 rays resolve the edge to an eighth of the lamp's side.

@@ -51,6 +51,8 @@ struct Row {
 /// What the rays of one patch met.
 struct Counts {
     rays: u32,
+    /// The share of the patch that is there.
+    coverage: f64,
     escaping: u32,
     onto_backs: u32,
     /// Patches, ascending, and how often they were met.
@@ -58,11 +60,12 @@ struct Counts {
 }
 
 impl Exchange {
-    /// Casts the rays of all `patches`, of which one of `full_size` square metres casts the most.
+    /// Casts the rays of all `patches`, of which one of `full_size` square metres casts the most. The area of a patch
+    /// on a screen becomes what of it stops light.
     #[must_use]
     pub fn new(
         facets: &[Facet],
-        patches: &[Patch],
+        patches: &mut [Patch],
         locator: &FacetLocator,
         tracer: &Tracer,
         full_size: f64,
@@ -82,6 +85,9 @@ impl Exchange {
                 target.count(&facets[patch.facet as usize], patch.element, rays, index as u32)
             })
             .collect();
+        for (patch, counts) in patches.iter_mut().zip(&counts) {
+            patch.area *= counts.coverage;
+        }
         let mut rows = joined(patches, &counts);
         scale(&mut rows, patches);
         Self { rows, rays: counts.iter().map(|c| u64::from(c.rays)).sum() }
@@ -119,13 +125,20 @@ impl Target<'_> {
     fn count(&self, facet: &Facet, element: u32, rays: u32, scramble: u32) -> Counts {
         let parts = facet.parts(element);
         let mut met = Vec::with_capacity(rays as usize);
-        let (mut escaping, mut onto_backs) = (0, 0);
+        let (mut escaping, mut onto_backs, mut absent) = (0, 0, 0);
+        let has_screens = self.tracer.has_screens();
         let lift = facet.frame.normal * self.tracer.margin();
         for index in 0..rays {
             let [u, v, s, t] = sequence::point(index, scramble.wrapping_mul(4));
             let origin = point_in_parts(&parts, s, t) + lift;
             let direction = facet.frame.cosine_direction(u, v);
-            match self.tracer.closest_hit(origin, direction) {
+            let [chance, own_chance] =
+                if has_screens { sequence::scattered(index, scramble) } else { [0.0; 2] };
+            if has_screens && self.tracer.own_coverage(origin, facet.frame.normal) <= own_chance {
+                absent += 1;
+                continue;
+            }
+            match self.tracer.stopped_by(origin, direction, chance) {
                 None => escaping += 1,
                 Some(hit) => match self.locator.find(self.tracer, &hit, origin + direction * hit.distance) {
                     None => onto_backs += 1,
@@ -139,7 +152,13 @@ impl Target<'_> {
         }
         met.sort_unstable();
         let met = met.chunk_by(|a, b| a == b).map(|c| (c[0], c.len() as u32)).collect();
-        Counts { rays, escaping, onto_backs, met }
+        if absent == rays {
+            // Hardly anything of it is there; what little there is sends its light away.
+            return Counts { rays: 1, coverage: 0.5 / f64::from(rays), escaping: 1, onto_backs, met };
+        }
+        let present = rays - absent;
+        let coverage = f64::from(present) / f64::from(rays);
+        Counts { rays: present, coverage, escaping, onto_backs, met }
     }
 }
 

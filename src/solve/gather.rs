@@ -359,9 +359,9 @@ impl Gathering<'_> {
         let (mut sum, mut nearness, mut near) = (DVec3::ZERO, 0.0, 0_u32);
         let reach = self.receiver.reach;
         let Source { field, hot_spots, .. } = self.source;
-        tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at| {
-            sum += field.radiosity(tracer, hit, at).as_dvec3();
-            nearness += 1.0 / hit.distance.max(tracer.margin());
+        tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at, share| {
+            sum += share * field.radiosity(tracer, hit, at).as_dvec3();
+            nearness += share / hit.distance.max(tracer.margin());
             near += u32::from(hit.distance < reach);
         });
         let rays = self.level.rays() as f64;

@@ -39,7 +39,7 @@ pub struct Patch {
     pub facet: u32,
     /// Index of its element there.
     pub element: u32,
-    /// Square metres.
+    /// Square metres; of a screen, what stops light.
     pub area: f64,
     /// Diffuse reflectance.
     pub reflectance: DVec3,
@@ -90,7 +90,7 @@ impl Patches {
                 }
             }
         }
-        let exchange = Exchange::new(facets, &patches, locator, tracer, patch_size * patch_size);
+        let exchange = Exchange::new(facets, &mut patches, locator, tracer, patch_size * patch_size);
         Self { patches, exchange, energy: Energy::default(), shots: 0 }
     }
 

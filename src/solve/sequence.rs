@@ -63,6 +63,14 @@ pub fn point(index: u32, scramble: u32) -> [f64; 4] {
     })
 }
 
+/// Two numbers in `(0, 1)` that nothing in [`point`] of the same `index` and `scramble` is related to.
+#[must_use]
+pub fn scattered(index: u32, scramble: u32) -> [f64; 2] {
+    [1, 2].map(|k| {
+        (f64::from(hash(hash(index).wrapping_add(hash(scramble ^ k << 30)))) + 0.5) / 4_294_967_296.0
+    })
+}
+
 /// Spreads neighbouring numbers over all (Wellons, "Prospecting for hash functions", 2018: lowbias32).
 fn hash(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);

@@ -20,6 +20,15 @@ pub struct Occluders {
     areas: Vec<f64>,
 }
 
+/// A convex polygon that occludes.
+#[derive(Clone, Copy, Debug)]
+pub struct Occluder<'a> {
+    /// World-space corners, in order.
+    pub corners: &'a [DVec3],
+    /// Whether it lets light through somewhere.
+    pub is_screen: bool,
+}
+
 /// Outlines with more corners occlude as triangles.
 const MOST_OUTLINE_CORNERS: usize = 6;
 
@@ -56,21 +65,23 @@ impl Occluders {
     ///
     /// `between` ascends, so a surface's triangles come one after the other, or nearly.
     #[must_use]
-    pub fn polygons<'a>(&'a self, tracer: &'a Tracer, between: &[u32]) -> Vec<&'a [DVec3]> {
-        let mut polygons: Vec<(f64, &[DVec3])> = Vec::with_capacity(between.len());
+    pub fn polygons<'a>(&'a self, tracer: &'a Tracer, between: &[u32]) -> Vec<Occluder<'a>> {
+        let mut polygons: Vec<(f64, Occluder)> = Vec::with_capacity(between.len());
         let mut taken: Vec<u32> = Vec::new();
         for &t in between {
             let surface = self.surface_of_triangle[t as usize];
+            let is_screen = tracer.is_screen(t as usize);
             match self.outlines.get(surface as usize).and_then(Option::as_deref) {
                 Some(outline) if outline.len() <= MOST_OUTLINE_CORNERS => {
                     if !taken.contains(&surface) {
                         taken.push(surface);
-                        polygons.push((self.areas[surface as usize], outline));
+                        polygons
+                            .push((self.areas[surface as usize], Occluder { corners: outline, is_screen }));
                     }
                 }
                 _ => {
                     let area = self.areas.get(surface as usize).copied().unwrap_or_default();
-                    polygons.push((area, &tracer.triangles()[t as usize]));
+                    polygons.push((area, Occluder { corners: &tracer.triangles()[t as usize], is_screen }));
                 }
             }
         }
@@ -84,7 +95,8 @@ impl Occluders {
     pub fn one_hides(&self, receiver: &[DVec3], emitter: &Emitter, tracer: &Tracer, between: &[u32]) -> bool {
         let mut corners = Vec::new();
         let mut last = NO_SURFACE;
-        between.iter().take(MOST_TRIED).any(|&t| {
+        let solid = between.iter().filter(|&&t| !tracer.is_screen(t as usize));
+        solid.take(MOST_TRIED).any(|&t| {
             let surface = self.surface_of_triangle[t as usize];
             let outline = self.outlines.get(surface as usize).and_then(Option::as_deref);
             let occluder = match outline {

@@ -82,7 +82,7 @@ struct Look<'a, V> {
     visit: V,
 }
 
-impl<V: FnMut(&Hit, DVec3)> NullaryFnOnce for Look<'_, V> {
+impl<V: FnMut(&Hit, DVec3, f64)> NullaryFnOnce for Look<'_, V> {
     type Output = ();
 
     #[inline(always)]
@@ -98,13 +98,22 @@ impl<V: FnMut(&Hit, DVec3)> NullaryFnOnce for Look<'_, V> {
                     distance: f64::from(met.distance[ray]) / self.tracer.scale,
                     from_behind: met.facing[ray] < 0.0,
                 };
-                (self.visit)(&hit, self.origin + fan.direction(ray) * hit.distance);
+                let at = |hit: &Hit| self.origin + fan.direction(ray) * hit.distance;
+                if self.tracer.is_screen(hit.triangle) {
+                    let visit = &mut self.visit;
+                    self.tracer.follow(self.origin, fan.direction(ray), |hit, share| {
+                        visit(hit, at(hit), share);
+                        true
+                    });
+                } else {
+                    (self.visit)(&hit, at(&hit), 1.0);
+                }
             }
         }
     }
 }
 
-/// The work of [`Tracer::occluded_all`], likewise.
+/// The work of [`Tracer::arriving_all`], likewise.
 struct Shadows<'a> {
     tracer: &'a Tracer,
     from: DVec3,
@@ -113,10 +122,10 @@ struct Shadows<'a> {
 }
 
 impl NullaryFnOnce for Shadows<'_> {
-    type Output = [bool; FAN];
+    type Output = [f64; FAN];
 
     #[inline(always)]
-    fn call(self) -> [bool; FAN] {
+    fn call(self) -> [f64; FAN] {
         let origin = self.tracer.traced(self.from);
         let mut fan = Fan { x: [1.0; FAN], y: [1.0; FAN], z: [1.0; FAN] };
         // Rays that are not asked for end before they begin.
@@ -136,12 +145,21 @@ impl NullaryFnOnce for Shadows<'_> {
                 met.distance[ray] = if met.triangle[ray] == NOTHING { met.distance[ray] } else { -1.0 };
             }
         });
-        met.triangle.map(|t| t != NOTHING)
+        std::array::from_fn(|ray| {
+            if met.triangle[ray] == NOTHING {
+                1.0
+            } else if self.tracer.has_screens() {
+                self.tracer.sight(self.from, self.to[ray]).arriving()
+            } else {
+                0.0
+            }
+        })
     }
 }
 
 impl Tracer {
-    /// Tells `visit` the nearest triangle that each ray from `origin` meets, if any, and the point where. The
+    /// Tells `visit` the nearest triangle that each ray from `origin` meets, if any, the point where, and the share
+    /// of the light that it stops: less than 1 for a screen, which is followed by what stands behind it. The
     /// directions of `fans` are in a frame with these unit `axes`.
     pub fn look(
         &self,
@@ -149,16 +167,16 @@ impl Tracer {
         axes: [DVec3; 3],
         fans: &[Fan],
         stack: &mut FanStack,
-        visit: impl FnMut(&Hit, DVec3),
+        visit: impl FnMut(&Hit, DVec3, f64),
     ) {
         let axes = axes.map(|a| a.as_vec3a());
         self.arch.dispatch(Look { tracer: self, origin, axes, fans, stack, visit });
     }
 
-    /// For each of at most [`FAN`] points `to` whether a triangle stands between `from` and it. The caller keeps all
-    /// off their own surfaces.
+    /// For each of at most [`FAN`] points `to` the share of the light that arrives there from `from`: 0 or 1, or
+    /// what screens between them let through. The caller keeps all off their own surfaces.
     #[must_use]
-    pub fn occluded_all(&self, from: DVec3, to: &[DVec3], stack: &mut FanStack) -> [bool; FAN] {
+    pub fn arriving_all(&self, from: DVec3, to: &[DVec3], stack: &mut FanStack) -> [f64; FAN] {
         self.arch.dispatch(Shadows { tracer: self, from, to, stack })
     }
 
@@ -323,7 +341,7 @@ mod tests {
             let fans: Vec<Fan> = directions.chunks_exact(FAN).map(Fan::new).collect();
             let (mut by_fans, mut singly) = (Vec::new(), Vec::new());
             let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-            tracer.look(origin, axes, &fans, &mut stack, |hit, _| by_fans.push(*hit));
+            tracer.look(origin, axes, &fans, &mut stack, |hit, _, _| by_fans.push(*hit));
             for fan in &fans {
                 singly.extend((0..FAN).filter_map(|ray| tracer.closest_hit(origin, fan.direction(ray))));
             }
@@ -344,7 +362,7 @@ mod tests {
         let to: Vec<DVec3> = directions().iter().map(|d| from + 1.2 * d).collect();
         let mut occluded = 0;
         for to in to.chunks(FAN - 3) {
-            let all = tracer.occluded_all(from, to, &mut stack);
+            let all = tracer.arriving_all(from, to, &mut stack).map(|share| share == 0.0);
             for (ray, to) in to.iter().enumerate() {
                 assert_eq!(all[ray], tracer.occluded(from, *to));
                 occluded += usize::from(all[ray]);
@@ -352,6 +370,6 @@ mod tests {
             assert!(all[to.len()..].iter().all(|hit| !hit));
         }
         assert!(occluded > 20);
-        assert_eq!(tracer.occluded_all(from, &[from, DVec3::NAN], &mut stack), [false; FAN]);
+        assert_eq!(tracer.arriving_all(from, &[from, DVec3::NAN], &mut stack), [1.0; FAN]);
     }
 }

@@ -6,6 +6,7 @@
 //! well as one at the origin; and scaled, since obvhs 0.4 overlooks what is nearer to a
 //! ray's origin than 1e-4 of its units: walls' feet, sheets on desks.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use glam::{DVec3, Vec3A};
@@ -17,9 +18,11 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 
 mod fan;
+mod screen;
 pub mod shaft;
 
 pub use fan::{FAN, Fan, FanStack};
+pub use screen::{Screen, Sight};
 
 use crate::geom::Bounds;
 
@@ -54,6 +57,8 @@ pub struct Tracer {
     triangles: Vec<[DVec3; 3]>,
     /// Empty where no triangle is double-sided.
     double_sided: Vec<bool>,
+    /// Empty where every triangle is solid.
+    screens: Vec<Option<Arc<dyn Screen>>>,
     centre: DVec3,
     /// From metres to obvhs's units.
     scale: f64,
@@ -105,9 +110,9 @@ impl Tracer {
         };
         let ordered = rays.primitive_indices.iter().map(facing).collect();
         let leaves = boxes.primitive_indices.iter().map(facing).collect();
-        let double_sided = Vec::new();
+        let (double_sided, screens) = (Vec::new(), Vec::new());
         let arch = pulp::Arch::new();
-        Self { rays, boxes, ordered, leaves, triangles, double_sided, centre, scale, diagonal, arch }
+        Self { rays, boxes, ordered, leaves, triangles, double_sided, screens, centre, scale, diagonal, arch }
     }
 
     /// Marks the triangles whose backs are surfaces like their fronts, in the order given to [`new`](Self::new).
@@ -146,9 +151,13 @@ impl Tracer {
         self.diagonal * RAY_MARGIN
     }
 
-    /// Whether a triangle stands between two points. The caller keeps both off their own surfaces.
+    /// Whether a triangle stands between two points; a screen does where it stops half of the light. The caller keeps
+    /// both off their own surfaces.
     #[must_use]
     pub fn occluded(&self, from: DVec3, to: DVec3) -> bool {
+        if self.has_screens() {
+            return self.sight(from, to).arriving() <= 0.5;
+        }
         if self.ordered.is_empty() {
             return false;
         }
@@ -158,7 +167,7 @@ impl Tracer {
         !self.rays.ray_traverse_miss(ray, |ray, id| self.ordered[id].intersect(ray))
     }
 
-    /// The nearest triangle along a ray; `direction` need not have unit length.
+    /// The nearest triangle along a ray, a screen as well as a solid one; `direction` need not have unit length.
     #[must_use]
     pub fn closest_hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         if self.ordered.is_empty() {

@@ -305,6 +305,7 @@ pub(crate) fn place(source: SourceDocument) -> Scene {
                 triangles: start..triangles.len(),
                 vertices: first..vertices.len(),
                 mirrored,
+                settings: cobake::scene::NodeSettings::default(),
             });
         }
     }

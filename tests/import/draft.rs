@@ -95,9 +95,15 @@ impl Draft {
 
     /// Adds a PNG of single-coloured texels as the base colour texture, with coordinates over the square.
     pub(crate) fn texture(&mut self, width: u32, texels: &[[u8; 3]]) {
+        let texels: Vec<[u8; 4]> = texels.iter().map(|&[r, g, b]| [r, g, b, 255]).collect();
+        self.texture_with_alpha(width, &texels);
+    }
+
+    /// The same of texels that have alpha.
+    pub(crate) fn texture_with_alpha(&mut self, width: u32, texels: &[[u8; 4]]) {
         let height = texels.len() as u32 / width;
         let mut png = std::io::Cursor::new(Vec::new());
-        let pixels = image::RgbImage::from_raw(width, height, texels.concat()).unwrap();
+        let pixels = image::RgbaImage::from_raw(width, height, texels.concat()).unwrap();
         pixels.write_to(&mut png, image::ImageFormat::Png).unwrap();
         let view = self.view(&png.into_inner());
         self.set("/images", json!([{"bufferView": view, "mimeType": "image/png"}]));

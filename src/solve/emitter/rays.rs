@@ -37,12 +37,12 @@ impl Evaluation {
         for rays in self.rays.chunks(FAN) {
             let mut to = [DVec3::ZERO; FAN];
             to.iter_mut().zip(rays).for_each(|(to, ray)| *to = ray.0);
-            let occluded = tracer.occluded_all(receiver.position, &to[..rays.len()], &mut self.stack);
+            let arriving = tracer.arriving_all(receiver.position, &to[..rays.len()], &mut self.stack);
             seen += rays
                 .iter()
-                .zip(occluded)
-                .filter(|(_, occluded)| !occluded)
-                .map(|(ray, _)| ray.1)
+                .zip(arriving)
+                .filter(|(_, arriving)| *arriving > 0.0)
+                .map(|(ray, arriving)| ray.1 * arriving)
                 .sum::<DVec3>();
         }
         self.effort.rays += self.rays.len() as u64;
@@ -63,6 +63,25 @@ impl AreaEmitter {
         e.rays.clear();
         self.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, DVec3::splat(part / all))));
         e.seen_along_rays(receiver, tracer).x
+    }
+
+    /// Of the light that solid triangles do not stop, the kernel-weighted share that screens let through.
+    pub(super) fn share_through_screens(
+        &self,
+        receiver: SurfacePoint,
+        tracer: &Tracer,
+        e: &mut Evaluation,
+    ) -> f64 {
+        let (mut unblocked, mut through) = (0.0, 0.0);
+        self.aim(receiver, tracer.margin(), RayGrid::Fine, |to, part| {
+            e.effort.rays += 1;
+            let sight = tracer.sight(receiver.position, to);
+            if !sight.is_blocked {
+                unblocked += part;
+                through += part * sight.let_through;
+            }
+        });
+        if unblocked > 0.0 { through / unblocked } else { 1.0 }
     }
 
     /// The form factor from `receiver` with nothing between, as its points tell it.
