@@ -8,21 +8,20 @@
 //! ask for visibility in every texel, and take several points a texel, which the texels are
 //! then fitted to.
 
-use std::collections::HashSet;
-
 use glam::{DAffine2, DVec2, DVec3};
 
-use super::cover::{Cover, Covering, neighbours, take_after_neighbours};
+use super::cover::{Cover, Covering, take_after_neighbours};
 use super::coverage::TexelSite;
-use super::fit::{FitTexel, LightSample, fit};
+use super::edge::fit_edges;
+use super::fit::LightSample;
 use super::penumbra::{SmoothBlock, is_soft};
+use super::shadowing::{Shadowing, Standing};
 use super::ways::TexelWays;
-use crate::geom::polygon::{contains, is_in_convex, nearest_on_segment, rectangle};
+use crate::geom::polygon::rectangle;
 use crate::geom::{Bounds, Frame, Ring};
-use crate::light::luminance;
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
-use crate::solve::umbra::{Occluder, Occluders};
+use crate::solve::umbra::Occluders;
 use crate::surface::Surface;
 use crate::trace::Tracer;
 use crate::unwrap::Chart;
@@ -39,28 +38,12 @@ const SMOOTH_BLOCKS: std::ops::RangeInclusive<usize> = 17..=1024;
 /// A block this many times smaller than the one whose shaft it inherited gets a shaft of its own.
 const BLOCKS_A_SHAFT: usize = 3;
 
-/// So many triangles that stand before a part of a surface are remembered for its parts.
-const MOST_REMEMBERED: usize = 512;
-
 /// Blocks of more texels than this are worked on side by side.
 const PARALLEL_BLOCK: usize = 4096;
-
-/// Light that changes by less than this fraction within a small block is taken once a texel.
-const SMOOTH: f64 = 0.3;
-
-/// Light from one emitter that is everywhere below this fraction of the scene's typical light is taken once a
-/// texel, too.
-const DIM: f64 = 0.02;
 
 /// Shadows of emitters that all together give less than this fraction of the scene's typical light are too faint to
 /// be looked for: as much may be missed in a smooth penumbra.
 const FAINT: f64 = 0.002;
-
-/// Where a shadow's edge crosses a texel, light is evaluated at this many points a side of it.
-const POINTS_A_SIDE: u32 = 3;
-
-/// Samples keep this many texels from their region's outline.
-const OUTLINE: f64 = 0.02;
 
 /// A texel that receives direct light.
 #[derive(Clone, Copy, Debug)]
@@ -80,8 +63,8 @@ pub(super) struct LitTexel {
     /// What is seen of it.
     pub covering: Covering,
     /// What arrives from the emitter at hand, and whether its shadow's edge is near.
-    now: DVec3,
-    is_at_edge: bool,
+    pub(super) now: DVec3,
+    pub(super) is_at_edge: bool,
     /// Luminance of the light that shadows between here and the next texel may hide or let through.
     pub doubtful: f64,
 }
@@ -200,54 +183,12 @@ impl DirectLight<'_> {
     }
 }
 
-/// Lets the texels at a shadow's edge, and those beside them, fit the samples.
-///
-/// The ones beside the edge have no samples yet: their light is about the same all over.
-fn fit_edges(texels: &mut [LitTexel], mut samples: Vec<LightSample>) {
-    let at_edge: HashSet<[u32; 2]> = texels.iter().filter(|t| t.is_at_edge).map(|t| t.cell).collect();
-    let is_beside = |cell| neighbours(cell).any(|n| at_edge.contains(&n));
-    let mut fitted = Vec::with_capacity(texels.len());
-    for texel in texels.iter() {
-        let is_free = texel.covering != Covering::Under && (texel.is_at_edge || is_beside(texel.cell));
-        if is_free && !texel.is_at_edge && texel.covering == Covering::Seen {
-            let middle = DVec2::new(texel.cell[0].into(), texel.cell[1].into()) + 0.5;
-            let around = [(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)];
-            samples
-                .extend(around.map(|(x, y)| LightSample { at: middle + DVec2::new(x, y), light: texel.now }));
-        }
-        fitted.push(FitTexel { cell: texel.cell, value: texel.now, is_free });
-    }
-    fit(&mut fitted, &samples);
-    for (texel, fitted) in texels.iter_mut().zip(fitted) {
-        texel.now = fitted.value;
-    }
-}
-
-/// What stands between an emitter and a part of a surface.
-#[derive(Clone, Debug)]
-enum Standing {
-    /// The one lies behind the other: no light arrives.
-    Behind,
-    /// Nothing: all light arrives.
-    Nothing,
-    /// One occluder that hides the whole emitter: no light arrives.
-    Umbra,
-    /// These triangles reach into the shaft, ascending.
-    Some(Vec<u32>),
-    /// More triangles than are worth remembering do.
-    Many,
-}
-
-/// What stands between all emitters and a part of a surface.
-#[derive(Clone, Debug)]
-pub struct Shadowing(Vec<Standing>);
-
 /// What came of a block.
 #[derive(Default)]
-struct Done {
-    ways: TexelWays,
-    effort: Effort,
-    samples: Vec<LightSample>,
+pub(super) struct Done {
+    pub(super) ways: TexelWays,
+    pub(super) effort: Effort,
+    pub(super) samples: Vec<LightSample>,
 }
 
 impl Done {
@@ -270,14 +211,14 @@ pub(super) fn texel_steps(chart: &Chart) -> [DVec2; 2] {
 }
 
 /// One emitter shining on one surface.
-struct Shining<'a> {
-    light: &'a DirectLight<'a>,
-    surface: &'a Surface,
+pub(super) struct Shining<'a> {
+    pub(super) light: &'a DirectLight<'a>,
+    pub(super) surface: &'a Surface,
     /// What of the surface the chart shows.
-    outline: &'a Ring,
-    plane_from_texel: DAffine2,
-    cover: Cover<'a>,
-    emitter: &'a Emitter,
+    pub(super) outline: &'a Ring,
+    pub(super) plane_from_texel: DAffine2,
+    pub(super) cover: Cover<'a>,
+    pub(super) emitter: &'a Emitter,
 }
 
 /// What a block inherits from a larger one.
@@ -289,7 +230,7 @@ struct Inherited<'a> {
     texels: usize,
 }
 
-fn extent(texels: &[LitTexel]) -> (DVec2, DVec2) {
+pub(super) fn extent(texels: &[LitTexel]) -> (DVec2, DVec2) {
     texels
         .iter()
         .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), t| (lo.min(t.point), hi.max(t.point)))
@@ -310,35 +251,6 @@ impl Shining<'_> {
         }
         let standing = self.standing_before(&hull, inherited.between);
         self.shine_past(texels, extent, &hull, &standing)
-    }
-
-    /// What stands before a rectangle, told from what is `known` of a larger one.
-    fn standing(&self, hull: &[DVec3; 4], known: Option<&Standing>) -> Standing {
-        let found = match known {
-            Some(known @ (Standing::Behind | Standing::Nothing | Standing::Umbra)) => return known.clone(),
-            _ if self.emitter.is_behind(hull, self.surface.frame.normal, self.light.tracer.margin()) => {
-                return Standing::Behind;
-            }
-            Some(Standing::Some(between)) => self.standing_before(hull, Some(between)),
-            Some(Standing::Many) | None => self.standing_before(hull, None),
-        };
-        match found {
-            Standing::Some(between) if between.len() > MOST_REMEMBERED => Standing::Many,
-            found => found,
-        }
-    }
-
-    /// What stands before a block that is not behind the emitter.
-    fn standing_before(&self, hull: &[DVec3; 4], inherited: Option<&[u32]>) -> Standing {
-        let tracer = self.light.tracer;
-        let between = self.emitter.between(hull, tracer, inherited);
-        if between.is_empty() {
-            Standing::Nothing
-        } else if self.light.occluders.one_hides(hull, self.emitter, tracer, &between) {
-            Standing::Umbra
-        } else {
-            Standing::Some(between)
-        }
     }
 
     fn shine_past(
@@ -442,87 +354,7 @@ impl Shining<'_> {
         Some(Done::of(ways, evaluation.effort))
     }
 
-    /// A small block in which shadow may fall: one point a texel where the light changes little from texel
-    /// to texel; where it changes much, the mean over several, and these as samples to be fitted.
-    fn shadow_edge(&self, texels: &mut [LitTexel], between: &[Occluder]) -> Done {
-        let mut evaluation = Evaluation::new(Precision::TEXEL);
-        let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
-        for texel in texels.iter_mut() {
-            texel.now = self.irradiance(texel.point, Between::Polygons(between), &mut evaluation);
-            let light = luminance(texel.now);
-            (least, most) = (least.min(light), most.max(light));
-        }
-        if self.light.edges == Edges::Once {
-            let middle = texels[texels.len() / 2].point;
-            let unoccluded = luminance(self.irradiance(middle, Between::Nothing, &mut evaluation));
-            texels.iter_mut().for_each(|t| t.doubtful += unoccluded);
-        }
-        let mut samples = Vec::new();
-        let is_bright = self.light.edges == Edges::Fitted && most > DIM * self.light.typical;
-        if is_bright && (texels.len() == 1 || most - least > SMOOTH * most) {
-            let outlines = self.outlines_near(texels);
-            for texel in texels.iter_mut().filter(|t| t.covering == Covering::Seen) {
-                let first = samples.len();
-                self.sample(texel, between, &outlines, (&mut evaluation, &mut samples));
-                let own = &samples[first..];
-                if !own.is_empty() {
-                    texel.now = own.iter().map(|s| s.light).sum::<DVec3>() / own.len() as f64;
-                    texel.is_at_edge = true;
-                }
-            }
-        }
-        let edge = texels.iter().filter(|t| t.is_at_edge).count() as u64;
-        let ways = TexelWays { edge, crossed: texels.len() as u64 - edge, ..TexelWays::default() };
-        Done { ways, effort: evaluation.effort, samples }
-    }
-
-    /// The edges of all regions' outlines that may pass through the texels' squares.
-    fn outlines_near(&self, texels: &[LitTexel]) -> Vec<[DVec2; 2]> {
-        let [right, down] = self.cover.step;
-        let (low, high) = extent(texels);
-        let reach = 2.0 * (right.abs() + down.abs());
-        let (low, high) = (low - reach, high + reach);
-        let edges = self
-            .surface
-            .regions
-            .iter()
-            .flat_map(|r| &r.rings)
-            .flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)).map(|(&a, &b)| [a, b]));
-        edges.filter(|[a, b]| a.max(*b).cmpge(low).all() && a.min(*b).cmple(high).all()).collect()
-    }
-
-    /// Light at points of the texel's square that lie in its region; `outlines` are those near it.
-    fn sample(
-        &self,
-        texel: &LitTexel,
-        between: &[Occluder],
-        outlines: &[[DVec2; 2]],
-        (evaluation, samples): (&mut Evaluation, &mut Vec<LightSample>),
-    ) {
-        let rings = self.surface.regions.get(texel.region as usize).map_or(&[][..], |r| &r.rings);
-        let corner = DVec2::new(texel.cell[0].into(), texel.cell[1].into());
-        for k in 0..POINTS_A_SIDE * POINTS_A_SIDE {
-            let place = DVec2::new((k % POINTS_A_SIDE).into(), (k / POINTS_A_SIDE).into());
-            let at = corner + (place + 0.5) / f64::from(POINTS_A_SIDE);
-            let point = self.plane_from_texel.transform_point2(at);
-            let is_inside = (outlines.is_empty() && !rings.is_empty())
-                || (contains(rings, point) && !self.is_at_outline(outlines, point));
-            // What lies beyond a cut is another chart's.
-            if is_inside && is_in_convex(self.outline, point) && !self.cover.hides(point) {
-                let light = self.irradiance(point, Between::Polygons(between), evaluation);
-                samples.push(LightSample { at, light });
-            }
-        }
-    }
-
-    /// Whether a point lies on an outline: where an emitter stands on that, it is seen edge-on from there.
-    fn is_at_outline(&self, outlines: &[[DVec2; 2]], point: DVec2) -> bool {
-        let [right, down] = self.cover.step;
-        let least = OUTLINE * right.length().min(down.length());
-        outlines.iter().any(|&[a, b]| nearest_on_segment(a, b, point).distance(point) < least)
-    }
-
-    fn irradiance(&self, point: DVec2, between: Between, evaluation: &mut Evaluation) -> DVec3 {
+    pub(super) fn irradiance(&self, point: DVec2, between: Between, evaluation: &mut Evaluation) -> DVec3 {
         let frame = &self.surface.frame;
         let position = frame.lift(point) + frame.normal * self.light.tracer.margin();
         let receiver = SurfacePoint { position, normal: frame.normal };

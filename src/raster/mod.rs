@@ -9,10 +9,12 @@ mod cover;
 mod coverage;
 mod dilate;
 mod direct;
+mod edge;
 mod fit;
 mod locate;
 mod penumbra;
 mod seams;
+mod shadowing;
 mod ways;
 
 use std::f64::consts::PI;
@@ -34,10 +36,10 @@ use cover::{Cover, take_after_neighbours};
 use coverage::chart_sites;
 pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
-pub use direct::Shadowing;
 use direct::{DirectLight, Edges, LitTexel, texel_steps};
 use locate::TriangleLocator;
 pub use seams::SeamReport;
+pub use shadowing::Shadowing;
 pub use ways::TexelWays;
 
 /// A finished lightmap page.
