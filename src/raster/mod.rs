@@ -15,6 +15,7 @@ mod penumbra;
 mod seams;
 mod ways;
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
@@ -28,7 +29,7 @@ use crate::solve::emitter::{Effort, Emitter};
 use crate::solve::umbra::Occluders;
 use crate::surface::{Region, Surface};
 use crate::trace::Tracer;
-use crate::unwrap::{Atlas, Chart};
+use crate::unwrap::{Atlas, Chart, PageArea};
 use buried::{Outlook, outlook};
 use cover::{Cover, take_after_neighbours};
 use coverage::chart_sites;
@@ -40,7 +41,7 @@ use locate::TriangleLocator;
 pub use seams::SeamReport;
 pub use ways::TexelWays;
 
-/// A finished lightmap page.
+/// A finished lightmap page, or several in one sheet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lightmap {
     /// Texels.
@@ -49,6 +50,20 @@ pub struct Lightmap {
     pub height: u32,
     /// Row by row from the top: the quantity asked for, linear RGB.
     pub texels: Vec<[f32; 3]>,
+}
+
+impl Lightmap {
+    /// A page of a sheet; what of it lies outside the sheet is left out.
+    #[must_use]
+    pub fn page(&self, area: PageArea) -> Cow<'_, Self> {
+        if (area.row, area.width, area.height) == (0, self.width, self.height) {
+            return Cow::Borrowed(self);
+        }
+        let rows = self.texels.chunks(self.width.max(1) as usize);
+        let rows = rows.skip(area.row as usize).take(area.height as usize);
+        let texels = rows.flat_map(|row| row.iter().take(area.width as usize)).copied().collect();
+        Cow::Owned(Self { width: area.width.min(self.width), height: area.height, texels })
+    }
 }
 
 /// What texels are made from.
@@ -202,7 +217,7 @@ pub struct Rasterized {
     pub counts: TexelCounts,
 }
 
-/// Computes all texels of the page.
+/// Computes all texels of all pages.
 #[must_use]
 pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> Rasterized {
     let input = lighting.input;
