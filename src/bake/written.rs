@@ -79,9 +79,8 @@ impl Written {
 
     /// All, with what aligning them may add.
     pub(super) fn sum(&self) -> u64 {
-        let aligned = |page: &PageBytes| {
-            page.exr.next_multiple_of(ALIGNMENT) + page.png.next_multiple_of(ALIGNMENT)
-        };
+        let aligned =
+            |page: &PageBytes| page.exr.next_multiple_of(ALIGNMENT) + page.png.next_multiple_of(ALIGNMENT);
         self.pages.iter().map(aligned).sum()
     }
 }

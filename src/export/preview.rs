@@ -44,9 +44,7 @@ fn value(texel: &[f32; 3]) -> DVec3 {
 
 fn encode_page(sent_out: &Lightmap, form: Preview, tone: &ToneMap) -> Result<Png, ExportError> {
     let (samples, scale): (Vec<u8>, f32) = match form {
-        Preview::Unlit => {
-            (sent_out.texels.iter().flat_map(|texel| tone.colour(value(texel))).collect(), 1.0)
-        }
+        Preview::Unlit => (sent_out.texels.iter().flat_map(|texel| tone.colour(value(texel))).collect(), 1.0),
         Preview::Emissive => {
             let scale = scale(sent_out);
             let byte = |&channel: &f32| srgb_byte(f64::from(channel) / f64::from(scale));

@@ -33,7 +33,8 @@ pub fn verify(glb: &[u8]) -> Result<(), ExportError> {
     for image in list("images") {
         let Some(view) = index_of(image.get("bufferView")) else { continue };
         let view = list("bufferViews").get(view).ok_or(problem("an image lies in no bufferView"))?;
-        let ours = image.get("name").and_then(Value::as_str).is_some_and(|name| names.iter().any(|n| n == name));
+        let ours =
+            image.get("name").and_then(Value::as_str).is_some_and(|name| names.iter().any(|n| n == name));
         let bytes = bytes_of(view, binary).unwrap_or_default();
         if ours
             && image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Png).decode().is_err()
@@ -59,9 +60,9 @@ pub fn lightmap_bytes(glb: &[u8]) -> u64 {
     let length = |json: &Value| {
         let lightmaps = json.get("extensions")?.get(COBAKE_LIGHTMAP)?.get("lightmaps")?.as_array()?;
         let views = json.get("bufferViews")?;
-        let lengths = lightmaps.iter().map(|lightmap| {
-            views.get(index_of(lightmap.get("bufferView"))?)?.get("byteLength")?.as_u64()
-        });
+        let lengths = lightmaps
+            .iter()
+            .map(|lightmap| views.get(index_of(lightmap.get("bufferView"))?)?.get("byteLength")?.as_u64());
         lengths.sum::<Option<u64>>()
     };
     glb::unpack(glb).ok().and_then(|(json, _)| length(&json)).unwrap_or(0)

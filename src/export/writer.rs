@@ -8,9 +8,9 @@ use super::document::{Document, Object, edit_object};
 use super::layout::{drop_extensions, forget_extensions};
 use super::materials::{LIGHTMAP_SET, LightmapImage, Materials};
 use super::plan::{LitNode, Plan};
+use super::pool::Choice;
 use super::primitive::DRACO;
 use super::source::{self, Rewritten};
-use super::pool::Choice;
 use super::{Baked, ExportError, Png, adaptive, encode_exr, encode_png, encode_previews};
 use crate::options::{BakeOptions, Quantity, Topology};
 use crate::scene::Placement;
@@ -79,11 +79,8 @@ fn lightmap_images(baked: &Baked) -> Result<Vec<LightmapImage>, ExportError> {
     let areas = &baked.atlas.pages;
     if let Some(form) = baked.options.preview {
         let sent_out = baked.preview.ok_or(ExportError::Mismatch { what: "a preview's texels" })?;
-        let image = |png: Png| LightmapImage {
-            intensity: f64::from(png.scale),
-            png: png.bytes,
-            preview: Some(form),
-        };
+        let image =
+            |png: Png| LightmapImage { intensity: f64::from(png.scale), png: png.bytes, preview: Some(form) };
         return Ok(encode_previews(sent_out, areas, form)?.into_iter().map(image).collect());
     }
     let factor = match baked.options.quantity {

@@ -130,8 +130,7 @@ fn on_pages(
         Room::Square(side) => {
             let side = side.min(LARGEST_SIDE) / gutter.align * gutter.align;
             let page = Page { width: side, height: side, gutter };
-            let too_small =
-                || UnwrapError::TooSmall { charts: shapes.len(), padding: gutter.padding, side };
+            let too_small = || UnwrapError::TooSmall { charts: shapes.len(), padding: gutter.padding, side };
             let fill = |own: &Vec<Shape>, most: f64| fill(own, page, most).ok_or_else(too_small);
             let layouts: Vec<_> = own.iter().map(|own| fill(own, limit)).collect::<Result<_, _>>()?;
             let least = layouts.iter().map(|l| l.texels_per_metre).fold(limit, f64::min);
@@ -154,8 +153,14 @@ fn on_pages(
 /// Puts pages one below another, so far apart that no chart's padding reaches the next page.
 fn sheet(atlases: Vec<Atlas>, (shapes, division): (&[Shape], &[Vec<usize>]), gutter: Gutter) -> Atlas {
     let gap = (2 * gutter.padding).next_multiple_of(gutter.align);
-    let mut sheet =
-        Atlas { width: 0, height: 0, texels_per_metre: 0.0, padding: gutter.padding, pages: vec![], charts: vec![] };
+    let mut sheet = Atlas {
+        width: 0,
+        height: 0,
+        texels_per_metre: 0.0,
+        padding: gutter.padding,
+        pages: vec![],
+        charts: vec![],
+    };
     let (mut charts, mut squares, mut area) = (Vec::new(), 0.0, 0.0);
     for (page, (atlas, list)) in atlases.into_iter().zip(division).enumerate() {
         let row = if page == 0 { 0 } else { (sheet.height + gap).next_multiple_of(gutter.align) };

@@ -203,8 +203,14 @@ impl Results {
             }
         });
         let pages = vec![PageArea { row: 0, width: side, height: side }];
-        let atlas =
-            Atlas { width: side, height: side, pages, texels_per_metre: 8.0, padding: 1, charts: charts.collect() };
+        let atlas = Atlas {
+            width: side,
+            height: side,
+            pages,
+            texels_per_metre: 8.0,
+            padding: 1,
+            charts: charts.collect(),
+        };
         let texel = |i: u32| [(i % side) as f32 / 16.0, (i / side) as f32 / 64.0, 0.5];
         let lightmap = Lightmap { width: side, height: side, texels: (0..side * side).map(texel).collect() };
         let mesh = RadiosityMesh { surfaces: surfaces.iter().map(fan).collect() };
