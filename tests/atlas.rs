@@ -339,7 +339,7 @@ fn what_does_not_fit_is_refused() {
 /// What is too much for the largest page, or for the one asked for, goes to several; groups stay whole where they can.
 #[test]
 fn several_pages_hold_what_one_does_not() {
-    let floors: Vec<_> = (0..4).map(|_| rectangle(9.0, 10.0)).collect();
+    let floors: Vec<_> = (0..4).map(|_| rectangle(8.0, 10.0)).collect();
     let dense = UnwrapOptions::new(Room::Density(1000.0));
     assert!(matches!(unwrap(&floors, &dense), Err(UnwrapError::TooLarge { charts: 4, .. })));
     let atlas = unwrap(&floors, &UnwrapOptions { pages: 8, ..dense }).unwrap();

@@ -75,7 +75,13 @@ impl Materials {
             move_set(&mut changed, set);
         }
         self.carry_lightmap(document, &mut changed, need.page);
-        let made = if changed == original {
+        // What another page's variant has taken the place of is no longer the original.
+        let is_there = match material {
+            Some(index) => document.list("materials").get(index).and_then(Value::as_object) == Some(&changed),
+            None => changed == original,
+        };
+        let made = if is_there {
+            self.occupied.extend(material);
             material
         } else {
             match material.filter(|&index| self.occupied.insert(index)) {
