@@ -117,7 +117,8 @@ fn what_does_not_fit_one_page_fits_two() {
 fn every_triangle_finds_its_light_on_its_own_page() {
     let changes: [&dyn Fn(&mut BakeOptions); 4] =
         [&|_| {}, &|o| o.topology = Topology::Adaptive, &|o| o.mips = 2, &|o| {
-            (o.preview, o.density) = (Some(Preview::Unlit), DensityPolicy::Uniform)
+            o.preview = Some(Preview::Unlit);
+            o.density = DensityPolicy::Uniform;
         }];
     for name in ["cornell", "desk"] {
         let whole = check_triangles(&baked(name, &options(64, 1)));
