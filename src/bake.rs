@@ -42,7 +42,7 @@ const NUDGE_TEXELS: f64 = 0.1;
 pub struct BakeResult {
     /// The output as a binary glTF, ready to be written.
     pub glb: Vec<u8>,
-    /// The page that `glb` holds, at full precision.
+    /// The pages that `glb` holds, at full precision, one below another in one sheet; see [`Atlas::pages`].
     pub lightmap: Lightmap,
     /// The planar surfaces of the scene.
     pub surfaces: Vec<Surface>,
@@ -50,7 +50,7 @@ pub struct BakeResult {
     pub facets: Vec<Facet>,
     /// The solution on conforming triangles, one entry per surface.
     pub mesh: RadiosityMesh,
-    /// Where each surface lies in the page, in the same order.
+    /// Where each surface lies in the pages, in the same order.
     pub atlas: Atlas,
     /// What was done and what it cost.
     pub report: Report,
@@ -145,8 +145,9 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         options,
     };
     let lighting = Lighting::new(&raster_input);
+    let nodes = scene.placements.iter().map(|placement| placement.node).collect();
     let Page { atlas, lightmap, preview, texels } =
-        PageMaker::new(&lighting, options, scale.texel, weights).page(&mut recorder)?;
+        PageMaker::new(&lighting, options, scale.texel, weights, nodes).page(&mut recorder)?;
 
     enter(&mut recorder, Stage::Export)?;
     let glb = encode(&Baked {
@@ -163,7 +164,8 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     account::fill_report(&mut report, scene, &surfaces, &solution);
     account::fill_texels(&mut report, (&surfaces, &atlas), texels);
     let written = Written::in_document(&glb);
-    (report.lightmap.bytes, report.lightmap.png_bytes) = (written.exr, written.png);
+    (report.lightmap.bytes, report.lightmap.png_bytes) = (written.exr(), written.png());
+    report.lightmap.pages = account::pages(&atlas, &written);
     recorder.finish(&mut report);
     drop(appearance);
     let Solution { facets, .. } = solution;

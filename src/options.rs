@@ -185,6 +185,9 @@ pub struct BakeOptions {
     /// of the coarsest level, and gutters are as wide as one of these. Costs room, the more the smaller
     /// the charts are. Default: 0, for bilinear lookups in the lightmap itself.
     pub mips: u32,
+    /// The most pages, `[1, 64]`. [`Resolution::Size`] is for each of them, and they are filled; otherwise there are
+    /// several only where charts need more than one of 16384 texels a side. Default: 1.
+    pub pages: u32,
     /// Which of the document's scenes to bake. Default: its default scene.
     pub scene: Option<usize>,
     /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
@@ -224,6 +227,7 @@ impl Default for BakeOptions {
             max_reflectance: 0.95,
             padding: None,
             mips: 0,
+            pages: 1,
             scene: None,
             dynamic: Dynamic::default(),
         }
@@ -284,6 +288,7 @@ impl BakeOptions {
         }
         let most = crate::unwrap::MOST_MIPS;
         check(self.mips <= most, "mips", f64::from(self.mips), "between 0 and 4 levels")?;
+        check((1..=64).contains(&self.pages), "pages", f64::from(self.pages), "between 1 and 64")?;
         let m = self.illumination_threshold;
         check(m > 0.0 && m <= 1.0, "illumination-threshold", m, "above 0 and at most 1")?;
         let u = self.unshot_fraction;

@@ -336,6 +336,40 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(unwrap(&many, &huge), Err(UnwrapError::TooLarge { charts: 300, .. })));
 }
 
+/// What is too much for the largest page, or for the one asked for, goes to several; groups stay whole where they can.
+#[test]
+fn several_pages_hold_what_one_does_not() {
+    let floors: Vec<_> = (0..4).map(|_| rectangle(8.0, 10.0)).collect();
+    let dense = UnwrapOptions::new(Room::Density(1000.0));
+    assert!(matches!(unwrap(&floors, &dense), Err(UnwrapError::TooLarge { charts: 4, .. })));
+    let atlas = unwrap(&floors, &UnwrapOptions { pages: 8, ..dense }).unwrap();
+    assert_eq!(atlas.pages.len(), 2, "no more than needed");
+    assert!(atlas.charts.iter().all(|chart| chart.texel_from_plane.matrix2.determinant().abs() == 1e6));
+
+    let mut many: Vec<_> = (0..300).map(|_| rectangle(1.0, 1.0)).collect();
+    many.iter_mut().enumerate().for_each(|(index, surface)| surface.placement = index % 10);
+    let options = UnwrapOptions { padding: Some(1), pages: 5, ..at_size(32) };
+    let atlas = unwrap(&many, &options).unwrap();
+    assert_eq!(atlas.pages.len(), 5);
+    assert_sound(&many, &atlas);
+    for chart in &atlas.charts {
+        let page = atlas.pages[chart.page];
+        assert!(page.width <= 32 && page.height <= 32);
+        for p in points(&many[chart.surface]) {
+            let texel = chart.texel(p) - DVec2::new(0.0, page.row.into());
+            assert!(texel.cmpge(DVec2::ZERO).all(), "{texel}");
+            assert!(texel.x <= page.width.into() && texel.y <= page.height.into(), "{texel}");
+        }
+    }
+    let split = (0..10).filter(|placement| {
+        let mut pages =
+            atlas.charts.iter().filter(|c| many[c.surface].placement == *placement).map(|c| c.page);
+        let first = pages.next();
+        pages.any(|page| Some(page) != first)
+    });
+    assert_eq!(split.count(), 0, "two of ten groups on each of five pages");
+}
+
 /// Without padding asked for, crowded charts give theirs up before they are refused.
 #[test]
 fn crowded_charts_do_without_padding() {

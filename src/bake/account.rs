@@ -7,11 +7,13 @@ use crate::element::Facet;
 use crate::options::BakeOptions;
 use crate::progress::Progress;
 use crate::raster::TexelCounts;
-use crate::report::{DensityReport, Report};
+use crate::report::{DensityReport, PageReport, Report};
 use crate::scene::Scene;
 use crate::solve::Solution;
 use crate::surface::{Surface, SurfaceSet};
-use crate::unwrap::{Atlas, Chart, area_within};
+use crate::unwrap::{Atlas, Chart, PageArea, area_within};
+
+use super::written::Written;
 
 /// Says which contacts were lost.
 pub(super) fn warn_of_surfaces(set: &SurfaceSet, progress: &mut dyn Progress) {
@@ -111,15 +113,30 @@ pub(super) fn fill_texels(report: &mut Report, (surfaces, atlas): (&[Surface], &
     report.lightmap.seams = texels.seams;
     report.texels.exact = texels.effort.exact;
     report.texels.by_rays = texels.effort.by_rays;
-    report.lightmap.width = atlas.width;
-    report.lightmap.height = atlas.height;
+    report.lightmap.width = atlas.pages.iter().map(|page| page.width).max().unwrap_or(0);
+    report.lightmap.height = atlas.pages.iter().map(|page| page.height).max().unwrap_or(0);
     report.lightmap.texels_per_metre = atlas.texels_per_metre;
     report.lightmap.charts = atlas.charts.len() as u64;
-    let all = f64::from(atlas.width) * f64::from(atlas.height);
+    let all = atlas.pages.iter().map(PageArea::texels).sum::<u64>() as f64;
     report.lightmap.utilisation = texels.covered as f64 / all.max(1.0);
     report.lightmap.padding = texels.dilated as f64 / all.max(1.0);
     report.lightmap.gutter = 2 * atlas.padding;
     report.lightmap.density = density(surfaces, atlas);
+}
+
+/// What each page holds.
+pub(super) fn pages(atlas: &Atlas, written: &Written) -> Vec<PageReport> {
+    let page = |(index, area): (usize, &PageArea)| {
+        let bytes = written.pages.get(index).copied().unwrap_or_default();
+        PageReport {
+            width: area.width,
+            height: area.height,
+            charts: atlas.charts.iter().filter(|chart| chart.page == index).count() as u64,
+            bytes: bytes.exr,
+            png_bytes: bytes.png,
+        }
+    };
+    atlas.pages.iter().enumerate().map(page).collect()
 }
 
 /// How fine the charts are that show something.

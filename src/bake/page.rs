@@ -8,7 +8,7 @@ use crate::raster::{Lighting, Lightmap, Rasterized, TexelCounts, rasterize};
 use crate::report::Recorder;
 use crate::surface::Surface;
 use crate::unwrap::{
-    Atlas, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_padding, unwrap, whole,
+    Atlas, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_padding, unwrap_groups, whole,
 };
 
 use super::budget::{self, texels_for};
@@ -28,7 +28,7 @@ const SPARE: f64 = 1.25;
 /// No chart is longer than this many times the side of a square page, where the page may take any shape.
 const LONGEST: f64 = 1.5;
 
-/// A finished page.
+/// A finished page, or a finished sheet of several.
 pub(super) struct Page {
     pub(super) atlas: Atlas,
     pub(super) lightmap: Lightmap,
@@ -47,6 +47,8 @@ pub(super) struct PageMaker<'a> {
     survey: Option<LightSurvey>,
     /// How many times as dense as else texels lie on each surface.
     weights: Vec<f64>,
+    /// The node of each placement: its surfaces share a page where they can.
+    nodes: Vec<usize>,
 }
 
 impl<'a> PageMaker<'a> {
@@ -55,8 +57,9 @@ impl<'a> PageMaker<'a> {
         options: &'a BakeOptions,
         texel: f64,
         weights: Vec<f64>,
+        nodes: Vec<usize>,
     ) -> Self {
-        let mut maker = Self { lighting, options, texel, survey: None, weights };
+        let mut maker = Self { lighting, options, texel, survey: None, weights, nodes };
         if options.density == DensityPolicy::Light {
             let density = maker.density(maker.room(), options.padding);
             maker.survey = Some(LightSurvey::of(lighting, density));
@@ -89,7 +92,7 @@ impl<'a> PageMaker<'a> {
         enter(recorder, Stage::Unwrap)?;
         let surfaces = self.lighting.surfaces();
         let unwrapping = self.unwrapping(Room::Texels(0.0), Some(self.options.padding.unwrap_or(0)));
-        let atlas = unwrap(surfaces, &whole(surfaces), &unwrapping)?;
+        let atlas = self.unwrap(&whole(surfaces), &unwrapping)?;
         self.paint(atlas, recorder)
     }
 
@@ -121,7 +124,8 @@ impl<'a> PageMaker<'a> {
     }
 
     fn unwrapping(&self, room: Room, padding: Option<u32>) -> UnwrapOptions {
-        UnwrapOptions { padding, mips: self.options.mips, ..UnwrapOptions::new(room) }
+        let BakeOptions { mips, pages, .. } = *self.options;
+        UnwrapOptions { padding, mips, pages, ..UnwrapOptions::new(room) }
     }
 
     fn lay_out(&self, room: Room, padding: Option<u32>) -> Result<Atlas, UnwrapError> {
@@ -142,13 +146,18 @@ impl<'a> PageMaker<'a> {
                 parts
             }
         };
-        unwrap(surfaces, &parts, &unwrapping)
+        self.unwrap(&parts, &unwrapping)
+    }
+
+    fn unwrap(&self, parts: &[Part], unwrapping: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
+        let node = |surface: &Surface| self.nodes.get(surface.placement).copied().unwrap_or(0);
+        unwrap_groups(self.lighting.surfaces(), parts, &node, unwrapping)
     }
 
     /// What deciding on density must know of the page.
     fn density(&self, room: Room, padding: Option<u32>) -> DensityOptions {
         let texels = match room {
-            Room::Square(side) => FILLED * f64::from(side).powi(2),
+            Room::Square(side) => f64::from(self.options.pages) * FILLED * f64::from(side).powi(2),
             Room::Density(density) => {
                 let area: f64 = self.lighting.surfaces().iter().map(|s| s.area).sum();
                 area * density * density / COVERED

@@ -34,7 +34,9 @@ impl Scale {
     pub(super) fn of(surfaces: &[Surface], options: &BakeOptions) -> Self {
         let area: f64 = surfaces.iter().map(|s| s.area).sum();
         let texel = match options.resolution {
-            Resolution::Size(side) => (area / UTILISATION).sqrt() / f64::from(side),
+            Resolution::Size(side) => {
+                (area / UTILISATION).sqrt() / (f64::from(side) * f64::from(options.pages).sqrt())
+            }
             Resolution::TexelsPerMetre(density) => 1.0 / density,
             Resolution::Bytes(bytes) => {
                 let page = texels_for(bytes, options.quantity) / FILLED;

@@ -100,6 +100,11 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "BYTES", value_parser = bytes::parse, conflicts_with_all = ["size", "texels_per_metre"], help_heading = LIGHTMAP)]
     budget: Option<u64>,
 
+    /// The most pages, 1 to 64: with --size as many of that size are filled as charts want, else there are several
+    /// only where one of 16384 texels a side does not do
+    #[arg(long, value_name = "N", default_value_t = BakeOptions::default().pages, help_heading = LIGHTMAP)]
+    pub(crate) pages: u32,
+
     /// Where texels are dense [default: light; with a preview uniform]
     #[arg(long, value_enum, help_heading = LIGHTMAP)]
     density: Option<DensityWord>,
@@ -362,6 +367,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.max_reflectance = args.max_reflectance;
         options.padding = args.padding;
         options.mips = args.mips;
+        options.pages = args.pages;
         options.scene = args.scene;
         options.dynamic = args.dynamic.into();
         options
@@ -397,7 +403,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --scene 1 --dynamic cast",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --pages 5 --scene 1 --dynamic cast",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -416,6 +422,7 @@ mod tests {
         meant.max_reflectance = 0.9;
         meant.padding = Some(2);
         meant.mips = 3;
+        meant.pages = 5;
         meant.scene = Some(1);
         meant.dynamic = Dynamic::Cast;
         assert_eq!(typed, meant);

@@ -25,8 +25,12 @@ pub(crate) fn run(args: &BakeArgs) -> anyhow::Result<()> {
     let options = BakeOptions::from(args);
     options.validate().map_err(Error::from)?;
     let wanted = args.sidecars.wanted(args.engine.and_then(|engine| engine.sidecar(&args.output)));
-    let mut sidecars: Vec<_> =
-        wanted.iter().map(|(form, path)| (sidecars::option(*form), path.clone())).collect();
+    // Every page may have a file of its own; how many there will be is not known yet.
+    let pages = |(form, path): &(SidecarForm, PathBuf)| {
+        let (option, path) = (sidecars::option(*form), path.clone());
+        (0..args.pages as usize).map(move |page| (option, sidecars::path_of_page(&path, page)))
+    };
+    let mut sidecars: Vec<_> = wanted.iter().flat_map(pages).collect();
     if args.separate {
         if !args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("gltf")) {
             let message = "--separate is for glTF text; let the name of -o end in .gltf, or leave it out";
@@ -73,7 +77,7 @@ fn write(
     let mut clock = StageClock::start();
     clock.begin(Stage::Export);
     let mut set = scene_files(args, files, &result.glb)?;
-    set.extend(sidecars::encode(&result.lightmap, wanted)?);
+    set.extend(sidecars::encode(&result.lightmap, &result.atlas.pages, wanted)?);
     write_all(&set).map_err(Error::from)?;
     result.report.time.add(Stage::Export, clock.finish().total);
     result.report.peak_memory_bytes = peak_memory_bytes();

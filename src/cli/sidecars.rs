@@ -1,11 +1,12 @@
 //! The lightmap in files of its own, beside the output.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use cobake::error::Error;
 use cobake::export::{SidecarForm, WrittenFile, encode_sidecar};
 use cobake::raster::Lightmap;
+use cobake::unwrap::PageArea;
 
 /// The options that ask for them.
 #[derive(Args, Debug, Default)]
@@ -55,14 +56,45 @@ impl SidecarArgs {
     }
 }
 
-/// The finished files.
+/// Where a page goes: the first to `path`, others to names with their number, `light-1.exr` beside `light.exr`.
+pub(crate) fn path_of_page(path: &Path, page: usize) -> PathBuf {
+    if page == 0 {
+        return path.to_owned();
+    }
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{page}"));
+    if let Some(ending) = path.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    path.with_file_name(name)
+}
+
+/// The finished files, one a form and page.
 pub(crate) fn encode(
     lightmap: &Lightmap,
+    pages: &[PageArea],
     wanted: &[(SidecarForm, PathBuf)],
 ) -> anyhow::Result<Vec<WrittenFile>> {
-    let file = |(form, path): &(SidecarForm, PathBuf)| {
-        let bytes = encode_sidecar(lightmap, *form).map_err(Error::from)?;
-        Ok(WrittenFile { path: path.clone(), bytes })
-    };
-    wanted.iter().map(file).collect()
+    let mut files = Vec::new();
+    for (form, path) in wanted {
+        for (page, area) in pages.iter().enumerate() {
+            let bytes = encode_sidecar(&lightmap.page(*area), *form).map_err(Error::from)?;
+            files.push(WrittenFile { path: path_of_page(path, page), bytes });
+        }
+    }
+    Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_have_names_of_their_own() {
+        let of = |path: &str, page| path_of_page(Path::new(path), page);
+        assert_eq!(of("a/b.lit.exr", 0), Path::new("a/b.lit.exr"));
+        assert_eq!(of("a/b.lit.exr", 2), Path::new("a/b.lit-2.exr"));
+        assert_eq!(of("light", 1), Path::new("light-1"));
+    }
 }

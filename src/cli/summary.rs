@@ -7,8 +7,12 @@ use cobake::report::Report;
 /// What was baked, into what, and what it cost.
 pub(crate) fn paragraph(output: &Path, report: &Report) -> String {
     let Report { scene, elements, lightmap, texels, time, .. } = report;
+    let pages = match lightmap.pages.len() {
+        0 | 1 => String::new(),
+        count => format!("{count} pages of at most "),
+    };
     let mut text = format!(
-        "baked {} triangles in {} surfaces into {}: {} × {} texels, {} of them covered; ",
+        "baked {} triangles in {} surfaces into {}: {pages}{} × {} texels, {} of them covered; ",
         scene.triangles,
         scene.surfaces,
         output.display(),

@@ -224,6 +224,7 @@ impl Tile {
         let chart = Chart {
             surface: self.surface,
             outline: rectangle(self.min, self.max).to_vec(),
+            page: 0,
             texel_from_plane: DAffine2::from_mat2_translation(
                 DMat2::from_diagonal(scale),
                 DVec2::splat(0.5) - scale * self.min,

@@ -18,7 +18,7 @@ use super::ExportError;
 use super::cut::ChartedMesh;
 use super::document::Object;
 use super::interpolation::{Locator, PlaneTriangle, Rows};
-use super::pool::chart_coordinates;
+use super::pool::{Choice, chart_coordinates};
 use super::primitive::{insert_coordinates, prepare};
 use super::transform::world_from_node;
 use super::writer::Writer;
@@ -34,11 +34,12 @@ const IRRADIANCE: &str = "_IRRADIANCE";
 
 /// Replaces the geometry of those of a node's `primitives` that the `placements` (indices) name.
 ///
-/// Returns the placements that keep their own triangles.
+/// Returns the placements that keep their own triangles; primitives that the `choice` leaves nothing of become null.
 pub(super) fn rewrite<'a>(
     writer: &mut Writer<'a>,
     placements: &[usize],
     primitives: &mut [Value],
+    choice: Choice,
 ) -> Result<Vec<&'a Placement>, ExportError> {
     let baked = writer.baked;
     if baked.mesh.surfaces.len() != baked.surfaces.len() {
@@ -55,12 +56,17 @@ pub(super) fn rewrite<'a>(
                 if !primitive.contains_key("targets")
                     && meshes.iter().any(|p| !p.mesh.triangles.is_empty()) =>
             {
-                prepare(&mut writer.document, &mut writer.materials, primitive, placement.mesh)?;
+                if !has_any(writer, &meshes, choice)? {
+                    primitives[placement.primitive] = Value::Null;
+                    continue;
+                }
+                let page = (placement.mesh, choice.page);
+                prepare(&mut writer.document, &mut writer.materials, primitive, page)?;
                 let attributes = primitive.get("attributes").and_then(Value::as_object);
                 let rows = Rows::read(writer.document.source, attributes, placement.vertices.len())?;
                 let mut builder = Builder { node_from_world, rows, ..Builder::default() };
                 for part in meshes {
-                    builder.add(writer, placement, &part)?;
+                    builder.add(writer, placement, &part, choice)?;
                 }
                 builder.write(writer, primitive);
             }
@@ -68,6 +74,18 @@ pub(super) fn rewrite<'a>(
         }
     }
     Ok(rest)
+}
+
+/// Whether any triangle is one of the choice's.
+fn has_any(writer: &Writer, parts: &[Part], choice: Choice) -> Result<bool, ExportError> {
+    for part in parts.iter().filter(|_| choice.is_part) {
+        let charted = ChartedMesh::of(writer.baked, part.index, part.mesh)?;
+        let mut charts = (0..charted.mesh.triangles.len()).map(|triangle| charted.chart(triangle));
+        if charts.any(|chart| choice.takes(writer.baked.atlas, Some((part.index, chart)))) {
+            return Ok(true);
+        }
+    }
+    Ok(!choice.is_part)
 }
 
 /// A surface and the solution on it.
@@ -107,7 +125,13 @@ struct Builder {
 
 impl Builder {
     /// Adds a surface's triangles.
-    fn add(&mut self, writer: &Writer, placement: &Placement, part: &Part) -> Result<(), ExportError> {
+    fn add(
+        &mut self,
+        writer: &Writer,
+        placement: &Placement,
+        part: &Part,
+        choice: Choice,
+    ) -> Result<(), ExportError> {
         let mismatch = || ExportError::Mismatch { what: "meshes of the surfaces" };
         // Normals transform with the inverse of the transpose: here that of node from world.
         let normal = self.node_from_world.inverse().transpose().transform_vector3(part.surface.frame.normal);
@@ -117,6 +141,9 @@ impl Builder {
         let mut copies: BTreeMap<(u32, usize), Vec<u32>> = BTreeMap::new();
         for (index, &triangle) in charted.mesh.triangles.iter().enumerate() {
             let chart = charted.chart(index);
+            if !choice.takes(writer.baked.atlas, Some((part.index, chart))) {
+                continue;
+            }
             let mut vertices =
                 [MeshVertex { position: DVec2::ZERO, direct: DVec3::ZERO, indirect: DVec3::ZERO }; 3];
             for (slot, corner) in vertices.iter_mut().zip(triangle) {

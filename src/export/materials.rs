@@ -30,44 +30,58 @@ pub(super) struct LightmapImage {
     pub(super) preview: Option<Preview>,
 }
 
+/// What a lit primitive's material must do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Need {
+    /// The page that lights it.
+    pub(super) page: usize,
+    /// The set that the primitive's texture coordinate set 1 moved to.
+    pub(super) moved: Option<usize>,
+}
+
 /// The variants made so far.
 #[derive(Debug)]
 pub(super) struct Materials {
-    /// The image; `None` where the quantity is not one that `MOZ_lightmap` can hold.
-    image: Option<LightmapImage>,
-    /// The texture of the image, once a material needed it.
-    texture: Option<usize>,
+    /// The image of each page; none where the quantity is not one that `MOZ_lightmap` can hold.
+    images: Vec<LightmapImage>,
+    /// The textures of the images that a material needed, by page.
+    textures: BTreeMap<usize, usize>,
     /// Materials whose place is not free.
     occupied: BTreeSet<usize>,
-    /// By material (`None` the default one) and the set that its set 1 moved to.
-    variants: BTreeMap<(Option<usize>, Option<usize>), Option<usize>>,
+    /// By material (`None` the default one) and what its user needs.
+    variants: BTreeMap<(Option<usize>, Need), Option<usize>>,
 }
 
 impl Materials {
     /// No variants yet. `unlit` are the materials that someone without a lightmap uses.
-    pub(super) fn new(image: Option<LightmapImage>, unlit: BTreeSet<usize>) -> Self {
-        Self { image, texture: None, occupied: unlit, variants: BTreeMap::new() }
+    pub(super) fn new(images: Vec<LightmapImage>, unlit: BTreeSet<usize>) -> Self {
+        Self { images, textures: BTreeMap::new(), occupied: unlit, variants: BTreeMap::new() }
     }
 
-    /// The material to use in place of `material` (`None`: the default one) by a lit primitive whose
-    /// texture coordinate set 1 moved to set `moved`.
+    /// The material to use in place of `material` (`None`: the default one) by a lit primitive.
     pub(super) fn variant(
         &mut self,
         document: &mut Document,
         material: Option<usize>,
-        moved: Option<usize>,
+        need: Need,
     ) -> Option<usize> {
-        if let Some(&made) = self.variants.get(&(material, moved)) {
+        if let Some(&made) = self.variants.get(&(material, need)) {
             return made;
         }
         let original = material.and_then(|index| document.source.json.get("materials")?.get(index));
         let original = original.and_then(Value::as_object).cloned().unwrap_or_default();
         let mut changed = original.clone();
-        if let Some(set) = moved {
+        if let Some(set) = need.moved {
             move_set(&mut changed, set);
         }
-        self.carry_lightmap(document, &mut changed);
-        let made = if changed == original {
+        self.carry_lightmap(document, &mut changed, need.page);
+        // What another page's variant has taken the place of is no longer the original.
+        let is_there = match material {
+            Some(index) => document.list("materials").get(index).and_then(Value::as_object) == Some(&changed),
+            None => changed == original,
+        };
+        let made = if is_there {
+            self.occupied.extend(material);
             material
         } else {
             match material.filter(|&index| self.occupied.insert(index)) {
@@ -80,25 +94,25 @@ impl Materials {
                 None => Some(document.push("materials", changed.into())),
             }
         };
-        self.variants.insert((material, moved), made);
+        self.variants.insert((material, need), made);
         made
     }
 
     /// Whether lit primitives show the light as the colour of unlit materials.
     pub(super) fn are_unlit_previews(&self) -> bool {
-        self.image.as_ref().is_some_and(|image| image.preview == Some(Preview::Unlit))
+        self.images.first().is_some_and(|image| image.preview == Some(Preview::Unlit))
     }
 
     /// Puts the lightmap on a material in place of the one it may have; unlit ones show no light.
-    fn carry_lightmap(&mut self, document: &mut Document, material: &mut Object) {
+    fn carry_lightmap(&mut self, document: &mut Document, material: &mut Object, page: usize) {
         super::layout::drop_extensions(material, &[MOZ_LIGHTMAP]);
         let unlit = material.get("extensions").is_some_and(|e| e.get("KHR_materials_unlit").is_some());
-        let Some(image) = self.image.as_ref().filter(|_| !unlit) else { return };
-        let texture = match self.texture {
-            Some(texture) => texture,
-            None => place_texture(document, image, &self.occupied),
+        let Some(image) = self.images.get(page).filter(|_| !unlit) else { return };
+        let texture = match self.textures.get(&page) {
+            Some(&texture) => texture,
+            None => place_texture(document, (page, image), &self.occupied, &self.textures),
         };
-        self.texture = Some(texture);
+        self.textures.insert(page, texture);
         if let Some(form) = image.preview {
             let (made, extension) = preview::material(material, form, (texture, image.intensity));
             *material = made;
@@ -112,18 +126,23 @@ impl Materials {
     }
 }
 
-/// Adds the lightmap's image, sampler and texture. A file that is baked again gets its new image in
-/// the old one's place, if nobody else uses that.
-fn place_texture(document: &mut Document, image: &LightmapImage, unlit: &BTreeSet<usize>) -> usize {
+/// Adds a page's image, sampler and texture. A file that is baked again gets its new image in
+/// the old one's place, if nobody else uses that, nor another page by now.
+fn place_texture(
+    document: &mut Document,
+    (page, image): (usize, &LightmapImage),
+    unlit: &BTreeSet<usize>,
+    placed: &BTreeMap<usize, usize>,
+) -> usize {
     let view = document.add_view(image.png.clone());
-    let name = if image.preview.is_some() { "preview0" } else { "lightmap0" };
+    let name = format!("{}{page}", if image.preview.is_some() { "preview" } else { "lightmap" });
     let image = json!({"bufferView": view, "mimeType": "image/png", "name": name});
     let sampler = json!({"magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071});
     let sampler = match document.list("samplers").iter().position(|known| *known == sampler) {
         Some(known) => known,
         None => document.push("samplers", sampler),
     };
-    let old = replaceable_texture(document, unlit);
+    let old = replaceable_textures(document, unlit).into_iter().find(|old| placed.values().all(|p| p != old));
     let old_image = old.and_then(|texture| index_of(document.list("textures").get(texture)?.get("source")));
     let users = document.list("textures").iter().filter(|t| index_of(t.get("source")) == old_image).count();
     let image = match old_image.filter(|_| users == 1).and_then(|old| document.entry("images", old)) {
@@ -143,8 +162,8 @@ fn place_texture(document: &mut Document, image: &LightmapImage, unlit: &BTreeSe
     }
 }
 
-/// A texture that only lightmaps of lit materials use: one that this bake replaces.
-fn replaceable_texture(document: &Document, unlit: &BTreeSet<usize>) -> Option<usize> {
+/// Textures that only lightmaps of lit materials use: those that this bake replaces.
+fn replaceable_textures(document: &Document, unlit: &BTreeSet<usize>) -> Vec<usize> {
     let (mut lightmaps, mut others) = (BTreeSet::new(), BTreeSet::new());
     let materials = document.source.json.get("materials").and_then(Value::as_array);
     for (index, material) in materials.into_iter().flatten().enumerate() {
@@ -159,7 +178,7 @@ fn replaceable_texture(document: &Document, unlit: &BTreeSet<usize>) -> Option<u
         super::layout::drop_extensions(&mut material, &[MOZ_LIGHTMAP]);
         visit_textures(&mut material, &mut |info| others.extend(index_of(info.get("index"))));
     }
-    lightmaps.difference(&others).next().copied()
+    lightmaps.difference(&others).copied().collect()
 }
 
 /// Whether a material reads texture coordinate set 1 for anything but an old lightmap.
@@ -230,7 +249,7 @@ mod tests {
 
     fn materials(unlit: &[usize]) -> Materials {
         let image = LightmapImage { png: vec![1, 2, 3], intensity: 4.0, preview: None };
-        Materials::new(Some(image), unlit.iter().copied().collect())
+        Materials::new(vec![image], unlit.iter().copied().collect())
     }
 
     #[test]
@@ -239,7 +258,7 @@ mod tests {
         let mut document = Document::open(&source);
         assert!(uses_lightmap_set(&source.json["materials"][0]));
         assert!(!uses_lightmap_set(&source.json["materials"][2]));
-        let made = materials(&[]).variant(&mut document, Some(0), Some(2));
+        let made = materials(&[]).variant(&mut document, Some(0), Need { page: 0, moved: Some(2) });
         assert_eq!(made, Some(0));
         let material = &document.list("materials")[0];
         assert_eq!(material["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"], 2);
@@ -259,8 +278,8 @@ mod tests {
         let source = source();
         let mut document = Document::open(&source);
         let mut materials = materials(&[2]);
-        assert_eq!(materials.variant(&mut document, Some(2), None), Some(3));
-        assert_eq!(materials.variant(&mut document, Some(2), None), Some(3));
+        assert_eq!(materials.variant(&mut document, Some(2), Need::default()), Some(3));
+        assert_eq!(materials.variant(&mut document, Some(2), Need::default()), Some(3));
         assert_eq!(document.list("materials")[2], source.json["materials"][2]);
         assert_eq!(document.list("textures").len(), 3);
     }
@@ -270,9 +289,9 @@ mod tests {
         let source = source();
         let mut document = Document::open(&source);
         let mut materials = materials(&[]);
-        assert_eq!(materials.variant(&mut document, Some(1), None), Some(1));
+        assert_eq!(materials.variant(&mut document, Some(1), Need::default()), Some(1));
         assert!(document.list("extensionsUsed").is_empty());
-        let made = materials.variant(&mut document, None, None).unwrap();
+        let made = materials.variant(&mut document, None, Need::default()).unwrap();
         assert!(document.list("materials")[made]["extensions"]["MOZ_lightmap"].is_object());
         assert_eq!(document.list("extensionsUsed"), ["MOZ_lightmap"]);
     }
@@ -285,7 +304,7 @@ mod tests {
         source.json["materials"][0] = json!({});
         source.json["images"] = json!([{"uri": "a"}, {"uri": "b"}]);
         let mut document = Document::open(&source);
-        materials(&[]).variant(&mut document, Some(2), None);
+        materials(&[]).variant(&mut document, Some(2), Need::default());
         assert_eq!(document.list("textures").len(), 2);
         assert_eq!(document.list("images").len(), 2);
         assert_eq!(document.list("images")[1]["name"], "lightmap0");

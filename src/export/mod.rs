@@ -56,7 +56,7 @@ pub use exr::{decode_exr, encode_exr};
 pub(crate) use glb::base64;
 pub(crate) use materials::LIGHTMAP_SET;
 pub use png::{Png, encode_png};
-pub use preview::encode_preview;
+pub use preview::{encode_preview, encode_previews};
 pub use separate::{buffer_beside, referenced_files, separate};
 pub use sidecar::{SidecarForm, encode_sidecar};
 pub use verify::{lightmap_bytes, verify};
@@ -79,9 +79,9 @@ pub struct Baked<'a> {
     pub surfaces: &'a [Surface],
     /// Where each surface lies in the lightmap.
     pub atlas: &'a Atlas,
-    /// The texels.
+    /// The texels of all pages, the sheet that the atlas is of.
     pub lightmap: &'a Lightmap,
-    /// What the surfaces send out, nits, on the same page; needed where the options ask for a preview.
+    /// What the surfaces send out, nits, on the same sheet; needed where the options ask for a preview.
     pub preview: Option<&'a Lightmap>,
     /// The solution on its own triangles; written with [`Topology::Adaptive`](crate::options::Topology).
     pub mesh: &'a RadiosityMesh,

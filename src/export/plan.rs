@@ -11,6 +11,7 @@ use serde_json::Value;
 use super::cut::Cuts;
 use super::document::{Object, index_of};
 use super::{Baked, ExportError};
+use crate::unwrap::Atlas;
 
 /// A node whose mesh is lit.
 #[derive(Clone, Debug)]
@@ -83,6 +84,14 @@ impl Plan {
     /// The surfaces of a placement, in order.
     pub(super) fn surfaces_of(&self, placement: usize) -> &[usize] {
         self.surfaces.get(&placement).map_or(&[], Vec::as_slice)
+    }
+
+    /// The pages on which a node's surfaces lie, ascending; at least one.
+    pub(super) fn pages_of(&self, node: &LitNode, atlas: &Atlas) -> Vec<usize> {
+        let surfaces = node.placements.iter().flat_map(|&placement| self.surfaces_of(placement));
+        let charts = surfaces.flat_map(|&surface| atlas.charts_of(surface));
+        let pages: BTreeSet<usize> = charts.map(|chart| chart.page).collect();
+        if pages.is_empty() { vec![0] } else { pages.into_iter().collect() }
     }
 
     fn assign_meshes(&mut self, baked: &Baked, lit: &BTreeMap<usize, usize>) {

@@ -12,6 +12,7 @@ use super::blend::{Blend, BlendKey};
 use super::cut::Cuts;
 use super::{Baked, ExportError};
 use crate::scene::{Placement, Triangle};
+use crate::unwrap::Atlas;
 
 /// The vertices that a group of placements draws from.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,20 +25,23 @@ pub(super) struct Pool {
     pub(super) corners: Vec<Vec<[u32; 3]>>,
     /// Whether the pool is the source's own, vertex for vertex.
     pub(super) unsplit: bool,
+    /// Whether some triangles are not those of the choice.
+    pub(super) partial: bool,
     /// Whether the pool holds every source vertex, and copies of them alone.
     pub(super) complete: bool,
 }
 
 /// A chart: the surface, and which of the surface's charts.
-type ChartOf = (usize, usize);
+pub(super) type ChartOf = (usize, usize);
 
-/// Where `world` lies in the page by a surface's chart: texture coordinates, origin top left.
+/// Where `world` lies in its page by a surface's chart: texture coordinates, origin top left.
 pub(super) fn chart_coordinates(baked: &Baked, (surface, chart): ChartOf, world: DVec3) -> [f32; 2] {
     let Some(point) = baked.surfaces.get(surface).map(|s| s.frame.project(world)) else { return [0.0; 2] };
     let Some(chart) = baked.atlas.charts_of(surface).get(chart) else { return [0.0; 2] };
     let texel = chart.texel(point);
+    let Some(page) = baked.atlas.pages.get(chart.page) else { return [0.0; 2] };
     let side = |length: u32| f64::from(length.max(1));
-    let at = [texel.x / side(baked.atlas.width), texel.y / side(baked.atlas.height)];
+    let at = [texel.x / side(page.width), (texel.y - f64::from(page.row)) / side(page.height)];
     at.map(|c| if c.is_finite() { c as f32 } else { 0.0 })
 }
 
@@ -48,6 +52,8 @@ pub(super) struct Charted<'a> {
     pub(super) surface_of: &'a [Option<usize>],
     /// The triangles' parts.
     pub(super) cuts: &'a Cuts,
+    /// Which pieces are wanted.
+    pub(super) choice: Choice,
 }
 
 impl Charted<'_> {
@@ -59,6 +65,7 @@ impl Charted<'_> {
             ..Builder::default()
         };
         let mut corners = Vec::with_capacity(placements.len());
+        let mut partial = false;
         for placement in placements {
             let mut list = Vec::with_capacity(placement.triangles.len());
             for index in placement.triangles.clone() {
@@ -68,6 +75,10 @@ impl Charted<'_> {
                 };
                 for piece in self.cuts.pieces(index) {
                     let chart = surface.map(|surface| (surface, piece.chart));
+                    if !self.choice.takes(self.baked.atlas, chart) {
+                        partial = true;
+                        continue;
+                    }
                     // The source's winding.
                     let order = if placement.mirrored { [0, 2, 1] } else { [0, 1, 2] };
                     let mut out = [0; 3];
@@ -79,7 +90,29 @@ impl Charted<'_> {
             }
             corners.push(list);
         }
-        Ok(builder.finish(corners))
+        Ok(Pool { partial, ..builder.finish(corners) })
+    }
+}
+
+/// Of a node's triangles those that one page lights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Choice {
+    /// The page.
+    pub(super) page: usize,
+    /// Whether the node has triangles on other pages too.
+    pub(super) is_part: bool,
+    /// Whether triangles without a surface belong to it; one page of the node has them.
+    pub(super) is_first: bool,
+}
+
+impl Choice {
+    /// Whether a triangle in that chart, or in none, is one of these.
+    pub(super) fn takes(self, atlas: &Atlas, chart: Option<ChartOf>) -> bool {
+        if !self.is_part {
+            return true;
+        }
+        let Some((surface, chart)) = chart else { return self.is_first };
+        atlas.charts_of(surface).get(chart).is_some_and(|chart| chart.page == self.page)
     }
 }
 
@@ -161,7 +194,7 @@ impl Builder {
         let all = (0_u32..).take(self.chart.len()).map(Blend::copy_of);
         if self.added.is_empty() {
             let (vertices, coordinates) = (all.collect(), self.coordinates);
-            return Pool { vertices, coordinates, corners, unsplit: true, complete: true };
+            return Pool { vertices, coordinates, corners, unsplit: true, partial: false, complete: true };
         }
         let mut pool = Pool::default();
         let mut place = Vec::with_capacity(self.coordinates.len());

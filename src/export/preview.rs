@@ -4,7 +4,7 @@
 //! lightmap's page. It is shown as the colour of unlit materials, tone-mapped, or as the emission of black
 //! ones times `KHR_materials_emissive_strength`. Both texture slots are sRGB.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::document::Object;
@@ -15,6 +15,7 @@ use super::{ExportError, Png};
 use crate::options::Preview;
 use crate::picture::{ToneMap, srgb_byte};
 use crate::raster::Lightmap;
+use crate::unwrap::PageArea;
 
 /// Encodes what surfaces send out as an sRGB PNG; its scale is what 255 stands for, 1 where it is tone-mapped.
 ///
@@ -23,13 +24,27 @@ use crate::raster::Lightmap;
 /// # Errors
 /// [`ExportError::PageSize`] or [`ExportError::NotFinite`] for a map that is not whole.
 pub fn encode_preview(sent_out: &Lightmap, form: Preview) -> Result<Png, ExportError> {
-    check_texels(sent_out)?;
-    let value = |texel: &[f32; 3]| Vec3::from_array(*texel).as_dvec3();
+    let whole = PageArea { row: 0, width: sent_out.width, height: sent_out.height };
+    encode_previews(sent_out, &[whole], form).map(|mut pages| pages.swap_remove(0))
+}
+
+/// Encodes each of a sheet's pages as [`encode_preview`] does, all tone-mapped alike.
+///
+/// # Errors
+/// As [`encode_preview`].
+pub fn encode_previews(sheet: &Lightmap, pages: &[PageArea], form: Preview) -> Result<Vec<Png>, ExportError> {
+    check_texels(sheet)?;
+    let tone = ToneMap::for_values(sheet.texels.iter().map(value));
+    pages.iter().map(|area| encode_page(&sheet.page(*area), form, &tone)).collect()
+}
+
+fn value(texel: &[f32; 3]) -> DVec3 {
+    Vec3::from_array(*texel).as_dvec3()
+}
+
+fn encode_page(sent_out: &Lightmap, form: Preview, tone: &ToneMap) -> Result<Png, ExportError> {
     let (samples, scale): (Vec<u8>, f32) = match form {
-        Preview::Unlit => {
-            let tone = ToneMap::for_values(sent_out.texels.iter().map(value));
-            (sent_out.texels.iter().flat_map(|texel| tone.colour(value(texel))).collect(), 1.0)
-        }
+        Preview::Unlit => (sent_out.texels.iter().flat_map(|texel| tone.colour(value(texel))).collect(), 1.0),
         Preview::Emissive => {
             let scale = scale(sent_out);
             let byte = |&channel: &f32| srgb_byte(f64::from(channel) / f64::from(scale));

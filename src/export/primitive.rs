@@ -5,20 +5,20 @@ use serde_json::Value;
 use super::ExportError;
 use super::document::{Document, Object, edit_object, index_of};
 use super::layout::drop_extensions;
-use super::materials::{LIGHTMAP_SET, Materials, uses_lightmap_set};
+use super::materials::{LIGHTMAP_SET, Materials, Need, uses_lightmap_set};
 use super::plan::primitive_materials;
 
 /// Geometry compression: its data are of the old geometry.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Frees set 1 of a primitive of `mesh` and gives it materials that carry the lightmap.
+/// Frees set 1 of a primitive of `mesh` and gives it materials that carry the lightmap's `page`.
 ///
 /// A set 1 that a material reads moves to the next free set; one that nobody reads goes.
 pub(super) fn prepare(
     document: &mut Document,
     materials: &mut Materials,
     primitive: &mut Object,
-    mesh: usize,
+    (mesh, page): (usize, usize),
 ) -> Result<(), ExportError> {
     if drop_extensions(primitive, &[DRACO]) && !has_data(document, primitive) {
         return Err(ExportError::Compressed { list: "mesh", index: mesh, extension: DRACO });
@@ -48,8 +48,9 @@ pub(super) fn prepare(
             attributes.shift_remove("COLOR_0");
         });
     }
+    let need = Need { page, moved };
     let material = index_of(primitive.get("material"));
-    if let Some(variant) = materials.variant(document, material, moved) {
+    if let Some(variant) = materials.variant(document, material, need) {
         primitive.insert("material".into(), variant.into());
     }
     let mappings = primitive
@@ -57,7 +58,7 @@ pub(super) fn prepare(
         .and_then(|extensions| extensions.get_mut("KHR_materials_variants")?.get_mut("mappings"))
         .and_then(Value::as_array_mut);
     for mapping in mappings.into_iter().flatten().filter_map(Value::as_object_mut) {
-        let variant = materials.variant(document, index_of(mapping.get("material")), moved);
+        let variant = materials.variant(document, index_of(mapping.get("material")), need);
         if let Some(variant) = variant {
             mapping.insert("material".into(), variant.into());
         }

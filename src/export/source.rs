@@ -16,7 +16,7 @@ use super::ExportError;
 use super::accessor::{self, Component};
 use super::blend::{Blend, Kind, blend};
 use super::document::{Document, Object, Target, index_of};
-use super::pool::{Charted, Pool};
+use super::pool::{Charted, Choice, Pool};
 use super::primitive::{attribute_maps, insert_coordinates, prepare};
 use super::writer::Writer;
 use crate::scene::Placement;
@@ -43,22 +43,32 @@ struct Group<'a> {
     placements: Vec<&'a Placement>,
 }
 
-/// Gives those of a node's `primitives` that `placements` name their lightmap coordinates.
+/// Gives those of a node's `primitives` that `placements` name their lightmap coordinates; those that the `choice`
+/// leaves nothing of become null.
 pub(super) fn rewrite(
     writer: &mut Writer,
     placements: &[&Placement],
     primitives: &mut [Value],
+    choice: Choice,
 ) -> Result<(), ExportError> {
     for group in group(placements, primitives)? {
         let count = vertex_count(writer, &group)?;
-        let charted =
-            Charted { baked: writer.baked, surface_of: &writer.plan.surface_of, cuts: &writer.plan.cuts };
+        let (surface_of, cuts) = (&writer.plan.surface_of, &writer.plan.cuts);
+        let charted = Charted { baked: writer.baked, surface_of, cuts, choice };
         let pool = charted.pool(&group.placements, count)?;
+        if pool.corners.iter().all(Vec::is_empty) {
+            group.placements.iter().for_each(|p| primitives[p.primitive] = Value::Null);
+            continue;
+        }
         let coordinates = writer.document.add_floats(pool.coordinates.as_flattened(), 2);
         for (placement, corners) in group.placements.iter().zip(&pool.corners) {
+            if corners.is_empty() {
+                primitives[placement.primitive] = Value::Null;
+                continue;
+            }
             let primitive = primitives.get_mut(placement.primitive).and_then(Value::as_object_mut);
             let primitive = primitive.ok_or_else(|| not_there(placement))?;
-            prepare(&mut writer.document, &mut writer.materials, primitive, placement.mesh)?;
+            prepare(&mut writer.document, &mut writer.materials, primitive, (placement.mesh, choice.page))?;
             if !pool.unsplit {
                 for (attributes, target) in attribute_maps(primitive) {
                     for (name, value) in attributes {
@@ -71,7 +81,7 @@ pub(super) fn rewrite(
             }
             insert_coordinates(primitive, coordinates);
             let mode = primitive.get("mode").and_then(Value::as_u64).unwrap_or(TRIANGLES);
-            if !pool.unsplit || mode != TRIANGLES {
+            if !pool.unsplit || pool.partial || mode != TRIANGLES {
                 let indices = list_of_triangles(writer, placement, corners, pool.vertices.len());
                 primitive.insert("indices".into(), indices.into());
                 primitive.shift_remove("mode");

@@ -27,10 +27,14 @@ pub fn verify(glb: &[u8]) -> Result<(), ExportError> {
             return Err(problem("an accessor reaches beyond its bufferView"));
         }
     }
+    let maps = json.get("extensions").and_then(|e| e.get(COBAKE_LIGHTMAP)?.get("lightmaps")?.as_array());
+    let pages = 0..maps.map_or(0, Vec::len);
+    let names: Vec<String> = pages.flat_map(|k| [format!("lightmap{k}"), format!("preview{k}")]).collect();
     for image in list("images") {
         let Some(view) = index_of(image.get("bufferView")) else { continue };
         let view = list("bufferViews").get(view).ok_or(problem("an image lies in no bufferView"))?;
-        let ours = image.get("name").is_some_and(|name| name == "lightmap0" || name == "preview0");
+        let ours =
+            image.get("name").and_then(Value::as_str).is_some_and(|name| names.iter().any(|n| n == name));
         let bytes = bytes_of(view, binary).unwrap_or_default();
         if ours
             && image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Png).decode().is_err()
@@ -38,9 +42,7 @@ pub fn verify(glb: &[u8]) -> Result<(), ExportError> {
             return Err(problem("its lightmap's PNG is damaged"));
         }
     }
-    let extension = json.get("extensions").and_then(|e| e.get(COBAKE_LIGHTMAP)?.get("lightmaps"));
-    let lightmaps = extension.and_then(Value::as_array).ok_or(problem("it names no lightmap"))?;
-    for lightmap in lightmaps {
+    for lightmap in maps.ok_or(problem("it names no lightmap"))? {
         let view = index_of(lightmap.get("bufferView")).and_then(|view| list("bufferViews").get(view));
         let bytes = view.and_then(|view| bytes_of(view, binary)).ok_or(problem("a lightmap has no data"))?;
         let exr = decode_exr(bytes)?;
@@ -52,13 +54,16 @@ pub fn verify(glb: &[u8]) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// The size of the first lightmap's EXR, bytes; 0 if `glb` holds none.
+/// The size of the lightmaps' EXRs, bytes; 0 if `glb` holds none.
 #[must_use]
 pub fn lightmap_bytes(glb: &[u8]) -> u64 {
     let length = |json: &Value| {
-        let lightmap = json.get("extensions")?.get(COBAKE_LIGHTMAP)?.get("lightmaps")?.get(0)?;
-        let view = json.get("bufferViews")?.get(index_of(lightmap.get("bufferView"))?)?;
-        view.get("byteLength")?.as_u64()
+        let lightmaps = json.get("extensions")?.get(COBAKE_LIGHTMAP)?.get("lightmaps")?.as_array()?;
+        let views = json.get("bufferViews")?;
+        let lengths = lightmaps
+            .iter()
+            .map(|lightmap| views.get(index_of(lightmap.get("bufferView"))?)?.get("byteLength")?.as_u64());
+        lengths.sum::<Option<u64>>()
     };
     glb::unpack(glb).ok().and_then(|(json, _)| length(&json)).unwrap_or(0)
 }

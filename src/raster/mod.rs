@@ -17,6 +17,7 @@ mod seams;
 mod shadowing;
 mod ways;
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
@@ -30,7 +31,7 @@ use crate::solve::emitter::{Effort, Emitter};
 use crate::solve::umbra::Occluders;
 use crate::surface::{Region, Surface};
 use crate::trace::Tracer;
-use crate::unwrap::{Atlas, Chart};
+use crate::unwrap::{Atlas, Chart, PageArea};
 use buried::{Outlook, outlook};
 use cover::{Cover, take_after_neighbours};
 use coverage::chart_sites;
@@ -42,7 +43,7 @@ pub use seams::SeamReport;
 pub use shadowing::Shadowing;
 pub use ways::TexelWays;
 
-/// A finished lightmap page.
+/// A finished lightmap page, or several in one sheet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lightmap {
     /// Texels.
@@ -51,6 +52,20 @@ pub struct Lightmap {
     pub height: u32,
     /// Row by row from the top: the quantity asked for, linear RGB.
     pub texels: Vec<[f32; 3]>,
+}
+
+impl Lightmap {
+    /// A page of a sheet; what of it lies outside the sheet is left out.
+    #[must_use]
+    pub fn page(&self, area: PageArea) -> Cow<'_, Self> {
+        if (area.row, area.width, area.height) == (0, self.width, self.height) {
+            return Cow::Borrowed(self);
+        }
+        let rows = self.texels.chunks(self.width.max(1) as usize);
+        let rows = rows.skip(area.row as usize).take(area.height as usize);
+        let texels = rows.flat_map(|row| row.iter().take(area.width as usize)).copied().collect();
+        Cow::Owned(Self { width: area.width.min(self.width), height: area.height, texels })
+    }
 }
 
 /// What texels are made from.
@@ -204,7 +219,7 @@ pub struct Rasterized {
     pub counts: TexelCounts,
 }
 
-/// Computes all texels of the page.
+/// Computes all texels of all pages.
 #[must_use]
 pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> Rasterized {
     let input = lighting.input;

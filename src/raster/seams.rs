@@ -277,6 +277,8 @@ mod tests {
     use super::*;
     use glam::{DAffine2, DMat2};
 
+    use crate::unwrap::PageArea;
+
     /// Two charts of the unit square, cut at x = ½: one of 4 × 8 texels, one of 2 × 2.
     fn atlas() -> Atlas {
         let chart = |min: DVec2, max: DVec2, count: DVec2, at: DVec2| {
@@ -284,6 +286,7 @@ mod tests {
             Chart {
                 surface: 0,
                 outline: crate::geom::polygon::rectangle(min, max).to_vec(),
+                page: 0,
                 texel_from_plane: DAffine2::from_mat2_translation(scale, at + 0.5 - scale * min),
             }
         };
@@ -292,7 +295,8 @@ mod tests {
             chart(DVec2::ZERO, half, DVec2::new(4.0, 8.0), DVec2::new(1.0, 1.0)),
             chart(DVec2::new(0.5, 0.0), DVec2::ONE, DVec2::new(2.0, 2.0), DVec2::new(8.0, 1.0)),
         ];
-        Atlas { width: 16, height: 16, texels_per_metre: 8.0, padding: 1, charts }
+        let pages = vec![PageArea { row: 0, width: 16, height: 16 }];
+        Atlas { width: 16, height: 16, pages, texels_per_metre: 8.0, padding: 1, charts }
     }
 
     fn joined(light: impl Fn(DVec2) -> f64) -> (Atlas, Vec<[f32; 3]>, Vec<[f32; 3]>, SeamReport) {

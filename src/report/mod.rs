@@ -123,16 +123,16 @@ pub struct TexelReport {
     pub by_rays: u64,
 }
 
-/// The page.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+/// The lightmap: all pages together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LightmapReport {
-    /// Texels.
+    /// Of the widest page, texels.
     pub width: u32,
-    /// Texels.
+    /// Of the highest page, texels.
     pub height: u32,
     /// Density before charts were rounded to whole texels.
     pub texels_per_metre: f64,
-    /// Charts in the page.
+    /// Charts in all pages.
     pub charts: u64,
     /// Covered texels over all texels, `[0, 1]`.
     pub utilisation: f64,
@@ -142,12 +142,29 @@ pub struct LightmapReport {
     pub gutter: u32,
     /// How fine the charts are.
     pub density: DensityReport,
-    /// Size of the EXR.
+    /// Size of the EXRs.
     pub bytes: u64,
-    /// Size of the PNG that `MOZ_lightmap` names, 0 where there is none.
+    /// Size of the PNGs that `MOZ_lightmap` names, 0 where there is none.
     pub png_bytes: u64,
     /// How well charts agree where they meet.
     pub seams: SeamReport,
+    /// Each page.
+    pub pages: Vec<PageReport>,
+}
+
+/// One page.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PageReport {
+    /// Texels.
+    pub width: u32,
+    /// Texels.
+    pub height: u32,
+    /// Charts in the page.
+    pub charts: u64,
+    /// Size of the EXR.
+    pub bytes: u64,
+    /// Size of the PNG, 0 where there is none.
+    pub png_bytes: u64,
 }
 
 /// How fine charts are, texels a metre: the geometric mean of the density along either axis.
@@ -256,6 +273,7 @@ mod tests {
             "bytes",
             "png_bytes",
             "seams",
+            "pages",
         ];
         assert_eq!(keys(&json["lightmap"]["density"]), ["least", "median", "greatest"]);
         assert_eq!(keys(&json["lightmap"]), lightmap);

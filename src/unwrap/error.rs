@@ -6,7 +6,7 @@
 pub enum UnwrapError {
     /// The charts with their padding do not fit.
     #[error(
-        "{charts} charts with {padding} texels of padding do not fit into {side} × {side} texels; ask for a larger --size, a smaller --padding or fewer --mips"
+        "{charts} charts with {padding} texels of padding do not fit into {side} × {side} texels; ask for a larger --size, more --pages, a smaller --padding or fewer --mips"
     )]
     TooSmall {
         /// How many charts there are.
@@ -19,7 +19,7 @@ pub enum UnwrapError {
 
     /// The density asked for needs more than the largest page.
     #[error(
-        "{charts} charts at {texels_per_metre} texels a metre do not fit into {side} × {side} texels; ask for fewer texels (--texels-per-metre, --budget)"
+        "{charts} charts at {texels_per_metre} texels a metre do not fit into {side} × {side} texels; ask for fewer texels (--texels-per-metre, --budget) or more --pages"
     )]
     TooLarge {
         /// How many charts there are.

@@ -4,7 +4,7 @@ use super::bit_grid::BitGrid;
 use super::footprint;
 use super::pack::{Gutter, Packer, Page, Place, SizedShape};
 use super::shape::Shape;
-use super::{Atlas, pack};
+use super::{Atlas, PageArea, pack};
 
 /// Charts that fit.
 #[derive(Clone, Debug)]
@@ -25,6 +25,7 @@ impl Layout {
         Some(Atlas {
             width: page.width,
             height: page.height,
+            pages: vec![PageArea { row: 0, width: page.width, height: page.height }],
             texels_per_metre: self.texels_per_metre * if mean_weight.is_finite() { mean_weight } else { 1.0 },
             padding: page.gutter.padding,
             charts: sized.iter().zip(&self.places).map(|(chart, &place)| chart.chart(place)).collect(),

@@ -20,6 +20,7 @@ mod layout;
 mod least;
 mod max_rects;
 mod pack;
+mod pages;
 mod part;
 mod shape;
 #[cfg(feature = "xatlas")]
@@ -37,15 +38,20 @@ use fill::fill;
 use layout::density_of_texels;
 use least::least_page;
 use pack::{Gutter, LARGEST_SIDE, Page};
+use pages::lay_out_on_pages;
 use shape::Shape;
 
 /// Where each surface lies in the lightmap.
+///
+/// While texels are made, pages lie one below another in one sheet; a single page is the sheet.
 #[derive(Clone, Debug)]
 pub struct Atlas {
-    /// The page's width, texels.
+    /// The sheet's width, texels: that of the widest page.
     pub width: u32,
-    /// The page's height, texels.
+    /// The sheet's height, texels: that of all pages, and free rows between them.
     pub height: u32,
+    /// The pages, from the top; at least one.
+    pub pages: Vec<PageArea>,
     /// Texels per metre of surface, before what rounding charts to whole texels changed.
     pub texels_per_metre: f64,
     /// Free texels kept around what bilinear lookups of a chart touch, so that twice as many lie
@@ -77,7 +83,26 @@ impl Atlas {
     }
 }
 
-/// A part of a surface and its place in the page: an affine map, since a surface is flat.
+/// A page's place in the sheet: it begins in column 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PageArea {
+    /// Its first row.
+    pub row: u32,
+    /// Texels.
+    pub width: u32,
+    /// Texels.
+    pub height: u32,
+}
+
+impl PageArea {
+    /// How many texels it has.
+    #[must_use]
+    pub fn texels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+}
+
+/// A part of a surface and its place in the sheet: an affine map, since a surface is flat.
 ///
 /// It can always be inverted. It may mirror: a chart that is turned has its axes swapped.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,13 +111,15 @@ pub struct Chart {
     pub surface: usize,
     /// What of the surface the chart shows: what lies in this convex polygon, counter-clockwise, plane coordinates.
     pub outline: Ring,
-    /// Takes the surface's plane coordinates (metres) to texels; `(0, 0)` is the page's top left corner,
+    /// Index into the atlas's pages.
+    pub page: usize,
+    /// Takes the surface's plane coordinates (metres) to texels; `(0, 0)` is the sheet's top left corner,
     /// texel `(i, j)`'s centre lies at `(i + ½, j + ½)`.
     pub texel_from_plane: DAffine2,
 }
 
 impl Chart {
-    /// Where plane point `p` lies in the page, texels.
+    /// Where plane point `p` lies in the sheet, texels.
     #[must_use]
     pub fn texel(&self, p: DVec2) -> DVec2 {
         self.texel_from_plane.transform_point2(p)
@@ -126,6 +153,9 @@ pub struct UnwrapOptions {
     /// each chart's cell begins and ends at multiples of `2^mips`, with at least half as much padding
     /// inside. Costs room. Default: 0, for lookups in the page itself only.
     pub mips: u32,
+    /// The most pages, at least 1: [`Room::Square`] is for each, and as many are filled as charts want;
+    /// otherwise there are several where one of 16384 texels a side does not do. Default: 1.
+    pub pages: u32,
 }
 
 /// The most mip levels that [`UnwrapOptions::mips`] asks for: cells of 16 texels.
@@ -135,11 +165,11 @@ impl UnwrapOptions {
     /// The defaults in a page of this size.
     #[must_use]
     pub fn new(room: Room) -> Self {
-        Self { room, most: None, padding: None, mips: 0 }
+        Self { room, most: None, padding: None, mips: 0, pages: 1 }
     }
 }
 
-/// Lays a chart for each of the surfaces' `parts` (ordered by surface) out in one page.
+/// Lays a chart for each of the surfaces' `parts` (ordered by surface) out in one page, or in several.
 ///
 /// A part's own weight multiplies the density. Sides of the page are multiples of 4, but for one that
 /// [`Room::Square`] gives, and of the cells that mip levels ask for in any case. The same input gives the same atlas.
@@ -149,10 +179,28 @@ impl UnwrapOptions {
 /// [`UnwrapError::TooSmall`] if the charts do not fit even with one texel each,
 /// [`UnwrapError::TooLarge`] if the density asked for needs a page above 16384 texels.
 pub fn unwrap(surfaces: &[Surface], parts: &[Part], options: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
+    unwrap_groups(surfaces, parts, &|surface| surface.placement, options)
+}
+
+/// As [`unwrap`]; surfaces of one `group` share a page where they can.
+///
+/// # Errors
+/// As [`unwrap`].
+pub fn unwrap_groups(
+    surfaces: &[Surface],
+    parts: &[Part],
+    group: &dyn Fn(&Surface) -> usize,
+    options: &UnwrapOptions,
+) -> Result<Atlas, UnwrapError> {
     let shapes: Vec<_> = parts.iter().map(|part| Shape::of(part, &surfaces[part.surface])).collect();
-    let atlas = lay_out(&shapes, options, gutter(options.padding, options.mips));
+    let groups: Vec<usize> = parts.iter().map(|part| group(&surfaces[part.surface])).collect();
+    let lay_out = |gutter| match options.pages {
+        0 | 1 => lay_out(&shapes, options, gutter),
+        _ => lay_out_on_pages(&shapes, &groups, options, gutter),
+    };
+    let atlas = lay_out(gutter(options.padding, options.mips));
     match (&atlas, options.padding) {
-        (Err(_), None) => lay_out(&shapes, options, Gutter::new(0, options.mips)).or(atlas),
+        (Err(_), None) => lay_out(Gutter::new(0, options.mips)).or(atlas),
         _ => atlas,
     }
 }

@@ -175,6 +175,6 @@ impl<'a> SizedShape<'a> {
         };
         let corner = DVec2::new(f64::from(place.x), f64::from(place.y)) + 0.5;
         let texel_from_plane = DAffine2::from_mat2_translation(matrix, corner - matrix * self.shape.corner);
-        Chart { surface: self.shape.surface, outline: self.shape.outline.clone(), texel_from_plane }
+        Chart { surface: self.shape.surface, outline: self.shape.outline.clone(), page: 0, texel_from_plane }
     }
 }

@@ -10,7 +10,7 @@ use cobake::raster::Lightmap;
 use cobake::retriangulate::{MeshVertex, RadiosityMesh, SurfaceMesh};
 use cobake::scene::{Placement, Scene, SourceDocument, Triangle};
 use cobake::surface::Surface;
-use cobake::unwrap::{Atlas, Chart};
+use cobake::unwrap::{Atlas, Chart, PageArea};
 use glam::{DAffine2, DMat2, DMat4, DQuat, DVec2, DVec3};
 use serde_json::{Value, json};
 
@@ -195,14 +195,22 @@ impl Results {
             Chart {
                 surface: index,
                 outline: rectangle(low, high).to_vec(),
+                page: 0,
                 texel_from_plane: DAffine2::from_mat2_translation(
                     DMat2::IDENTITY * scale,
                     origin - low * scale,
                 ),
             }
         });
-        let atlas =
-            Atlas { width: side, height: side, texels_per_metre: 8.0, padding: 1, charts: charts.collect() };
+        let pages = vec![PageArea { row: 0, width: side, height: side }];
+        let atlas = Atlas {
+            width: side,
+            height: side,
+            pages,
+            texels_per_metre: 8.0,
+            padding: 1,
+            charts: charts.collect(),
+        };
         let texel = |i: u32| [(i % side) as f32 / 16.0, (i / side) as f32 / 64.0, 0.5];
         let lightmap = Lightmap { width: side, height: side, texels: (0..side * side).map(texel).collect() };
         let mesh = RadiosityMesh { surfaces: surfaces.iter().map(fan).collect() };

@@ -67,7 +67,7 @@ impl Results {
             let origin = DVec2::new(index as f64 % columns, (index as f64 / columns).floor()) * cell;
             let matrix = turn * scale;
             let texel_from_plane = DAffine2::from_mat2_translation(matrix, origin - matrix * low);
-            Chart { surface, outline, texel_from_plane }
+            Chart { surface, outline, page: 0, texel_from_plane }
         });
         self.atlas = Atlas { width, height, charts: charts.collect(), ..self.atlas };
         self
