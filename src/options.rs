@@ -187,6 +187,8 @@ pub struct BakeOptions {
     pub mips: u32,
     /// Which of the document's scenes to bake. Default: its default scene.
     pub scene: Option<usize>,
+    /// Whether the output holds the elements and their Close Objects Buffers' states too, to look at. Default: no.
+    pub elements: Toggle,
     /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
     pub dynamic: Dynamic,
 }
@@ -225,6 +227,7 @@ impl Default for BakeOptions {
             padding: None,
             mips: 0,
             scene: None,
+            elements: Toggle::Off,
             dynamic: Dynamic::default(),
         }
     }

@@ -128,6 +128,10 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_enum, default_value_t = TopologyWord::Source, help_heading = LIGHTMAP)]
     topology: TopologyWord,
 
+    /// Write the elements and their Close Objects Buffers' states into the output too, for `cobake view`
+    #[arg(long, help_heading = REFINEMENT)]
+    elements: bool,
+
     /// Which elements are split when a shooter's light arrives
     #[arg(long, value_enum, default_value_t = RefineWord::CobGradient, help_heading = REFINEMENT)]
     refine: RefineWord,
@@ -363,6 +367,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.padding = args.padding;
         options.mips = args.mips;
         options.scene = args.scene;
+        options.elements = if args.elements { Toggle::On } else { Toggle::Off };
         options.dynamic = args.dynamic.into();
         options
     }
@@ -397,7 +402,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --scene 1 --dynamic cast",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --scene 1 --dynamic cast --elements",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -418,6 +423,7 @@ mod tests {
         meant.mips = 3;
         meant.scene = Some(1);
         meant.dynamic = Dynamic::Cast;
+        meant.elements = Toggle::On;
         assert_eq!(typed, meant);
     }
 

@@ -10,8 +10,8 @@ use super::materials::{LIGHTMAP_SET, LightmapImage, Materials};
 use super::plan::{LitNode, Plan};
 use super::primitive::DRACO;
 use super::source::{self, Rewritten};
-use super::{Baked, ExportError, adaptive, encode_exr, encode_png, encode_preview};
-use crate::options::{BakeOptions, Quantity, Topology};
+use super::{Baked, ExportError, adaptive, elements, encode_exr, encode_png, encode_preview};
+use crate::options::{BakeOptions, Quantity, Toggle, Topology};
 use crate::scene::Placement;
 
 /// Our own extension: on the root the lightmaps, on nodes which one lights them.
@@ -49,7 +49,11 @@ pub(super) fn write_document(baked: &Baked) -> Result<Vec<u8>, ExportError> {
     let mut document = writer.document;
     forget_unused_draco(&mut document.root);
     let view = document.add_view(exr);
-    let extension = json!({
+    let elements = match baked.options.elements {
+        Toggle::On => elements::write(&mut document, baked.facets),
+        Toggle::Off => None,
+    };
+    let mut extension = json!({
         "version": 1,
         "lightmaps": [{
             "bufferView": view,
@@ -61,6 +65,9 @@ pub(super) fn write_document(baked: &Baked) -> Result<Vec<u8>, ExportError> {
         }],
         "baked": provenance(baked),
     });
+    if let (Some(elements), Some(extension)) = (elements, extension.as_object_mut()) {
+        extension.insert("elements".into(), elements);
+    }
     edit_object(&mut document.root, "extensions", |extensions| {
         extensions.insert(COBAKE_LIGHTMAP.into(), extension);
     });
