@@ -181,7 +181,8 @@ async function shares(page, colours) {
 }
 
 const elementsShow = (given) =>
-  withBake(given.program, ["--elements"], (file) =>
+  // Light from the mesh alone, and elements as small as this, let many buffers be asked.
+  withBake(given.program, ["--elements", "--direct", "mesh", "--subdivision-threshold", "0.02"], (file) =>
     withPage({ ...given, a: file }, async (page) => {
       await page.keyboard.press("b"); // all A
       const plain = await page.locator("#facts dl").textContent();
@@ -203,6 +204,7 @@ async function helpAndPage(page) {
   assert.ok(await page.locator("#atlas").isVisible());
   await page.keyboard.press("?");
   assert.ok(await page.locator("#help").isVisible());
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), "Close", "what Enter does first");
   await page.keyboard.press("Escape");
   assert.ok(!(await page.locator("#help").isVisible()));
 }
