@@ -157,6 +157,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         lightmap: &lightmap,
         preview: preview.as_ref(),
         mesh: &mesh,
+        facets: &solution.facets,
         options,
     })?;
     let mut report = Report { options: options.clone(), ..Report::default() };

@@ -190,6 +190,8 @@ pub struct BakeOptions {
     pub pages: u32,
     /// Which of the document's scenes to bake. Default: its default scene.
     pub scene: Option<usize>,
+    /// Whether the output holds the elements and their Close Objects Buffers' states too, to look at. Default: no.
+    pub elements: Toggle,
     /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
     pub dynamic: Dynamic,
 }
@@ -229,6 +231,7 @@ impl Default for BakeOptions {
             mips: 0,
             pages: 1,
             scene: None,
+            elements: Toggle::Off,
             dynamic: Dynamic::default(),
         }
     }

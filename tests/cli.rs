@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 33] = [
+const OPTIONS: [&str; 34] = [
     "--separate",
     "--for",
     "--exr",
@@ -25,6 +25,7 @@ const OPTIONS: [&str; 33] = [
     "--size",
     "--texels-per-metre",
     "--dynamic",
+    "--elements",
     "--threads",
     "--report",
     "--pictures",

@@ -133,6 +133,10 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_enum, default_value_t = TopologyWord::Source, help_heading = LIGHTMAP)]
     topology: TopologyWord,
 
+    /// Write the elements and their Close Objects Buffers' states into the output too, for `cobake view`
+    #[arg(long, help_heading = REFINEMENT)]
+    elements: bool,
+
     /// Which elements are split when a shooter's light arrives
     #[arg(long, value_enum, default_value_t = RefineWord::CobGradient, help_heading = REFINEMENT)]
     refine: RefineWord,
@@ -369,6 +373,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.mips = args.mips;
         options.pages = args.pages;
         options.scene = args.scene;
+        options.elements = if args.elements { Toggle::On } else { Toggle::Off };
         options.dynamic = args.dynamic.into();
         options
     }
@@ -403,7 +408,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --pages 5 --scene 1 --dynamic cast",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --pages 5 --scene 1 --dynamic cast --elements",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -425,6 +430,7 @@ mod tests {
         meant.pages = 5;
         meant.scene = Some(1);
         meant.dynamic = Dynamic::Cast;
+        meant.elements = Toggle::On;
         assert_eq!(typed, meant);
     }
 

@@ -72,7 +72,7 @@ fn as_json(found: &Inspection, bytes: u64) -> anyhow::Result<String> {
 
 fn as_text(file: &Path, found: &Inspection, bytes: u64) -> String {
     let mut text = format!("{}\n", file.display());
-    let reach = |r: Range| format!("{:.4} to {:.4}, mean {:.4}", r.least, r.greatest, r.mean);
+    let reach = |r: Range| format!("{} to {}, mean {}", figure(r.least), figure(r.greatest), figure(r.mean));
     let mut rows = vec![
         row("file", format!("{bytes} bytes")),
         row("triangles", format!("{}, {} of them lit", found.triangles, found.lit_triangles)),
@@ -93,7 +93,7 @@ fn as_text(file: &Path, found: &Inspection, bytes: u64) -> String {
         rows.push(row("density", format!("{}, texels a metre", reach(page.density))));
     }
     for (key, value) in found.baked.as_object().into_iter().flatten() {
-        rows.push(row(key, value.as_str().map_or_else(|| value.to_string(), str::to_owned)));
+        rows.push(row(key, words(value)));
     }
     if found.baked == Value::Null {
         rows.push(row("baked", "the file does not say how".to_owned()));
@@ -102,6 +102,43 @@ fn as_text(file: &Path, found: &Inspection, bytes: u64) -> String {
     text
 }
 
+/// Four decimals, or where these would say nothing, powers of ten.
+fn figure(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 { format!("{value:.3e}") } else { format!("{value:.4}") }
+}
+
+/// An option as a file tells it, without JSON's marks.
+fn words(value: &Value) -> String {
+    match value {
+        Value::Null => "as the scene asks".to_owned(),
+        Value::String(word) => word.clone(),
+        Value::Object(parts) => {
+            let parts: Vec<String> =
+                parts.iter().map(|(name, value)| format!("{name} {}", words(value))).collect();
+            parts.join(", ")
+        }
+        other => other.to_string(),
+    }
+}
+
 fn row(name: &str, value: String) -> [String; 3] {
     [name.to_owned(), String::new(), value]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_figures_say_something() {
+        assert_eq!([0.0, 2.5e-7, 0.25, 1234.5].map(figure), ["0.0000", "2.500e-7", "0.2500", "1234.5000"]);
+    }
+
+    #[test]
+    fn options_are_words() {
+        let told = json!({"cobHeight": {"of-element": 1.0}, "threshold": null, "refine": "cob", "mips": 0});
+        let told: Vec<String> =
+            ["cobHeight", "threshold", "refine", "mips"].iter().map(|key| words(&told[*key])).collect();
+        assert_eq!(told, ["of-element 1.0", "as the scene asks", "cob", "0"]);
+    }
 }

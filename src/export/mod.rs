@@ -16,6 +16,8 @@
 //!
 //! [`Preview`]: crate::options::Preview
 //!
+//! With [`BakeOptions::elements`] the elements and the states of their Close Objects Buffers are there to look at.
+//!
 //! What is not lit stays as it was: nodes, names, animations, skins, cameras, lights, extras, and
 //! extensions that nobody here knows. With [`Topology::Source`] the triangles stay as well.
 //!
@@ -29,6 +31,7 @@ mod blend;
 mod compact;
 mod cut;
 mod document;
+mod elements;
 mod error;
 mod exr;
 mod glb;
@@ -63,6 +66,7 @@ pub use verify::{lightmap_bytes, verify};
 pub use write::{WrittenFile, file_of, write, write_all, write_whole};
 pub(crate) use writer::COBAKE_LIGHTMAP;
 
+use crate::element::Facet;
 use crate::options::BakeOptions;
 use crate::raster::Lightmap;
 use crate::retriangulate::RadiosityMesh;
@@ -85,6 +89,8 @@ pub struct Baked<'a> {
     pub preview: Option<&'a Lightmap>,
     /// The solution on its own triangles; written with [`Topology::Adaptive`](crate::options::Topology).
     pub mesh: &'a RadiosityMesh,
+    /// The elements that the solution was made on; written with [`elements`](BakeOptions::elements).
+    pub facets: &'a [Facet],
     /// What the bake was told; says what the texels hold and which geometry to write.
     pub options: &'a BakeOptions,
 }

@@ -180,6 +180,10 @@ fn visit_other_views(root: &mut Object, visit: &mut impl FnMut(&mut Value)) {
             }
         }
     }
+    for part in ["positions", "corners", "states"] {
+        let part = child(root, &["extensions", "COBAKE_lightmap", "elements", part]);
+        part.and_then(|part| part.get_mut("bufferView")).into_iter().for_each(&mut *visit);
+    }
 }
 
 #[cfg(test)]
@@ -216,6 +220,23 @@ mod tests {
         assert_eq!(root["accessors"][2]["sparse"]["values"]["bufferView"], 3);
         assert_eq!(root["images"][0]["bufferView"], 4);
         assert_eq!(added, BTreeMap::from([(5, vec![1])]));
+    }
+
+    /// A file baked with its elements loses them, and nothing else, when it is baked again.
+    #[test]
+    fn elements_are_known() {
+        let mut root = document("COBAKE_lightmap");
+        root["images"] = json!([{"bufferView": 6}]);
+        let elements = json!({"count": 1, "positions": {"bufferView": 5}, "corners": {"bufferView": 5},
+                              "states": {"bufferView": 5}});
+        root.insert("extensions".into(), json!({"COBAKE_lightmap": {"elements": elements}}));
+        let before = References::of(&mut root);
+        before.drop_orphans(&mut root, &[], &mut BTreeMap::new());
+        assert_eq!(root["bufferViews"].as_array().unwrap().len(), 7, "they are read");
+        root.shift_remove("extensions");
+        before.drop_orphans(&mut root, &[], &mut BTreeMap::new());
+        assert_eq!(root["bufferViews"], json!(["a", "b", "c", "d", "e", "g"]));
+        assert_eq!(root["images"][0]["bufferView"], 5);
     }
 
     #[test]

@@ -11,8 +11,8 @@ use super::plan::{LitNode, Plan};
 use super::pool::Choice;
 use super::primitive::DRACO;
 use super::source::{self, Rewritten};
-use super::{Baked, ExportError, Png, adaptive, encode_exr, encode_png, encode_previews};
-use crate::options::{BakeOptions, Quantity, Topology};
+use super::{Baked, ExportError, Png, adaptive, elements, encode_exr, encode_png, encode_previews};
+use crate::options::{BakeOptions, Quantity, Toggle, Topology};
 use crate::scene::Placement;
 use crate::unwrap::PageArea;
 
@@ -61,11 +61,18 @@ pub(super) fn write_document(baked: &Baked) -> Result<Vec<u8>, ExportError> {
             "includes": includes(baked.options.quantity),
         }));
     }
-    let extension = json!({
+    let elements = match baked.options.elements {
+        Toggle::On => elements::write(&mut document, baked.facets),
+        Toggle::Off => None,
+    };
+    let mut extension = json!({
         "version": 1,
         "lightmaps": lightmaps,
         "baked": provenance(baked),
     });
+    if let (Some(elements), Some(extension)) = (elements, extension.as_object_mut()) {
+        extension.insert("elements".into(), elements);
+    }
     edit_object(&mut document.root, "extensions", |extensions| {
         extensions.insert(COBAKE_LIGHTMAP.into(), extension);
     });

@@ -1,6 +1,6 @@
 // The page as a picture: its light, its charts' outlines, and where the probe is.
 
-import { luminance, sample, scaleOf } from "view/light";
+import { isIrradiance, luminance, sample, scaleOf } from "view/light";
 import { VIRIDIS } from "view/legend";
 
 /** The longest side of the picture, pixels. */
@@ -22,7 +22,7 @@ export class Atlas {
     const context = this.canvas.getContext("2d");
     context.drawImage(drawn, 0, 0);
     this.figure.querySelector("figcaption").textContent =
-      `Page of ${letter}: ${page.width} × ${page.height}, ${model.charts} charts, light in false colour`;
+      `Page of ${letter}: ${page.width} × ${page.height}, ${model.charts} charts, ${isIrradiance(page.quantity) ? "irradiance" : "radiosity"} in false colour`;
     if (!mark) return;
     const scale = drawn.width / page.width;
     context.strokeStyle = "#fff";

@@ -13,6 +13,9 @@ export const DIVERGING = [
   [1.0, 0.86, 0.5],
 ];
 
+/** Of a Close Objects Buffer: never asked, empty, not empty; the colours of the pictures that a bake draws. */
+export const COB_STATES = [[176, 176, 176], [86, 140, 205], [238, 144, 44]].map((colour) => colour.map((c) => c / 255));
+
 const css = ([r, g, b]) => `rgb(${[r, g, b].map((c) => Math.round(255 * c)).join(" ")})`;
 
 /** A short number: three digits, whatever its size. */
@@ -26,7 +29,7 @@ export function short(value) {
 export function drawLegend(element, mode, scale) {
   const kinds = {
     false: {
-      title: "Irradiance, luminance (lux), logarithmic",
+      title: `${scale.name}, luminance (lux), logarithmic`,
       map: VIRIDIS,
       ticks: [0, 0.25, 0.5, 0.75, 1].map((t) => short(scale.low * (scale.high / scale.low) ** t)),
     },
@@ -35,12 +38,17 @@ export function drawLegend(element, mode, scale) {
       map: DIVERGING,
       ticks: [-1, -0.5, 0, 0.5, 1].map((t) => `${t > 0 ? "+" : ""}${short(100 * scale.difference * t)} %`),
     },
+    elements: {
+      title: "Elements of the solver, by their Close Objects Buffer",
+      keys: ["never asked", "empty", "not empty"].map((name, state) => [COB_STATES[state], name]),
+    },
     charts: { title: "Each chart of the page in a colour of its own" },
   };
   const kind = kinds[mode];
   element.hidden = !kind;
   if (!kind) return;
   const bar = kind.map ? `<i style="background:linear-gradient(90deg,${kind.map.map(css).join()})"></i>` : "";
+  const keys = (kind.keys ?? []).map(([colour, name]) => `<span><s style="background:${css(colour)}"></s>${name}</span>`).join("");
   const ticks = (kind.ticks ?? []).map((tick) => `<span>${tick}</span>`).join("");
-  element.innerHTML = `<b>${kind.title}</b>${bar}${ticks && `<div>${ticks}</div>`}`;
+  element.innerHTML = `<b>${kind.title}</b>${bar}${keys && `<div>${keys}</div>`}${ticks && `<div>${ticks}</div>`}`;
 }

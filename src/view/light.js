@@ -41,7 +41,10 @@ export function sample(page, u, v) {
   return mix(row(y0), row(y1), y - y0);
 }
 
-/** What a texel stands for: irradiance, but for radiosity, whose albedo only the surface knows. */
+/** Whether irradiance follows from a texel alone; of radiosity only the surface, which knows its albedo, could tell. */
+export const isIrradiance = (quantity) => quantity !== "radiosity";
+
+/** What makes irradiance of a texel, where that can be; 1 for radiosity, which stays what it is. */
 export const scaleOf = (quantity) => (quantity === "radiance" ? Math.PI : 1);
 
 export const luminance = ([r, g, b]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;

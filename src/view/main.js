@@ -6,12 +6,20 @@ import {
 } from "three";
 import { Atlas } from "view/atlas";
 import { drawLegend, short } from "view/legend";
-import { range } from "view/light";
+import { isIrradiance, range } from "view/light";
 import { loadModel, probe } from "view/model";
 import { MEASURE, MODES, shared } from "view/shader";
+import { elementUniforms } from "view/elements";
 
 const $ = (id) => document.getElementById(id);
-const state = { mode: "lit", stops: 0, swipe: 0.5, difference: 0.2, grid: false, wire: false, cut: false, pinned: null };
+
+/** What the pages' texels are shown as. */
+function quantityName(pages) {
+  const names = new Set(pages.map(({ quantity }) => (isIrradiance(quantity) ? "Irradiance" : "Radiosity")));
+  return [...names].join(" of A, ") + (names.size > 1 ? " of B" : "");
+}
+
+const state = { mode: "lit", stops: 0, swipe: 0.5, difference: 0.2, grid: false, wire: false, mesh: false, cut: false, pinned: null };
 
 function fail(error) {
   $("status").textContent = `The bake cannot be shown: ${error.message ?? error}`;
@@ -40,6 +48,9 @@ function run(renderer, models) {
   const atlas = new Atlas($("atlas"));
   const type = renderer.extensions.has("EXT_color_buffer_float") ? FloatType : HalfFloatType;
   const target = new WebGLRenderTarget(1, 1, { type, minFilter: NearestFilter, magFilter: NearestFilter });
+  const hasElements = models.some((model) => model.elements);
+  // Where one holds radiosity and the other what irradiance follows from, no number says how far they are apart.
+  const isComparable = Boolean(b) && isIrradiance(a.pages[0].quantity) === isIrradiance(b.pages[0].quantity);
   let pointer = null;
   let wanted = 0;
 
@@ -90,6 +101,7 @@ function run(renderer, models) {
       renderer.setRenderTarget(null);
       shared.other.value = target.texture;
     }
+    elementUniforms.filled.value = state.mode === "elements";
     renderer.setClearAlpha(1);
     shared.mode.value = MODES.indexOf(state.mode);
     const split = isSplit() ? Math.round(state.swipe * width) : width;
@@ -99,6 +111,7 @@ function run(renderer, models) {
       renderer.setScissor(x, 0, w, height);
       renderer.clear();
       renderer.render(model.scene, camera);
+      if (model.elements && (state.mesh || state.mode === "elements")) renderer.render(model.elements, camera);
     }
     renderer.setScissorTest(false);
   }
@@ -123,13 +136,15 @@ function run(renderer, models) {
       const lines = [];
       for (const [i, value] of found.values.entries()) {
         if (!value) continue;
-        const name = value.page?.quantity === "radiosity" ? "radiosity" : "irradiance";
+        const name = value.isIrradiance === false ? "radiosity" : "irradiance";
         const letter = "AB"[i];
         lines.push([`${letter} ${name}`, value.light ? `<b>${short(value.luminance)}</b> lux` : "no lightmap", letter.toLowerCase()]);
         if (value.light) lines.push(["R G B", value.light.map(short).join(" &nbsp;")]);
         if (value.page) lines.push(["texel", `${value.x.toFixed(1)}, ${value.y.toFixed(1)}`], ["texels a metre", short(value.density)]);
       }
-      if (first?.light && second?.light) {
+      if (first?.light && second?.light && first.isIrradiance !== second.isIrradiance) {
+        lines.push(["B against A", "radiosity and irradiance do not compare"]);
+      } else if (first?.light && second?.light) {
         const change = (100 * (second.luminance - first.luminance)) / first.luminance;
         lines.push(["B against A", `<b>${change > 0 ? "+" : ""}${change.toFixed(2)} %</b>`]);
       }
@@ -149,7 +164,7 @@ function run(renderer, models) {
 
   const plain = ({ own, position, normal, node, material, values }) => ({
     own, position: position.toArray(), normal: normal.toArray(), node, material,
-    values: values.map((v) => v && { light: v.light, x: v.x, y: v.y, luminance: v.luminance }),
+    values: values.map((v) => v && { light: v.light, isIrradiance: v.isIrradiance, x: v.x, y: v.y, luminance: v.luminance }),
   });
 
   function refresh() {
@@ -165,9 +180,10 @@ function run(renderer, models) {
     for (const button of $("modes").children) {
       const own = button.dataset.mode === state.mode;
       button.setAttribute("aria-checked", own);
-      button.disabled = button.dataset.mode === "difference" && !b;
+      button.disabled = !isPossible(button.dataset.mode);
     }
-    for (const name of ["grid", "wire", "cut"]) $(name).checked = state[name];
+    for (const name of ["grid", "wire", "mesh", "cut"]) $(name).checked = state[name];
+    $("mesh").disabled = !hasElements;
     $("atlas-box").checked = !$("atlas").hidden;
     $("exposure").value = state.stops;
     $("exposure-out").textContent = `${state.stops > 0 ? "+" : ""}${state.stops} stops`;
@@ -177,12 +193,17 @@ function run(renderer, models) {
     $("swipe").hidden = !isSplit();
     $("swipe").style.left = `${100 * state.swipe}%`;
     $("swipe").setAttribute("aria-valuenow", Math.round(100 * state.swipe));
-    drawLegend($("legend"), state.mode, { low: shared.low.value, high: shared.high.value, difference: state.difference });
+    drawLegend($("legend"), state.mode, {
+      low: shared.low.value, high: shared.high.value, difference: state.difference, name: quantityName(models.map((model) => model.pages[0])),
+    });
     refresh();
   }
 
+  const isPossible = (mode) =>
+    ({ difference: isComparable, elements: hasElements })[mode] ?? true;
+
   function set(changes) {
-    if (changes.mode === "difference" && !b) return;
+    if (!isPossible(changes.mode ?? state.mode) || (changes.mesh && !hasElements)) return;
     Object.assign(state, changes);
     state.swipe = Math.min(Math.max(state.swipe, 0), 1);
     state.stops = Math.min(Math.max(state.stops, -6), 6);
@@ -221,6 +242,7 @@ function run(renderer, models) {
     "]": () => set({ difference: state.difference * 1.25 }),
     g: () => set({ grid: !state.grid }),
     t: () => set({ wire: !state.wire }),
+    m: () => set({ mesh: !state.mesh }),
     x: () => set({ cut: !state.cut }),
     p: togglePage,
     w: () => walk(0, 0, 1), s: () => walk(0, 0, -1), a: () => walk(-1, 0, 0), d: () => walk(1, 0, 0),
@@ -244,7 +266,7 @@ function run(renderer, models) {
     const button = event.target.closest("button");
     if (button) set({ mode: button.dataset.mode });
   });
-  for (const name of ["grid", "wire", "cut"]) $(name).addEventListener("change", () => set({ [name]: $(name).checked }));
+  for (const name of ["grid", "wire", "mesh", "cut"]) $(name).addEventListener("change", () => set({ [name]: $(name).checked }));
   $("atlas-box").addEventListener("change", togglePage);
   $("exposure").addEventListener("input", () => set({ stops: Number($("exposure").value) }));
   $("range").addEventListener("input", () => set({ difference: 10 ** Number($("range").value) }));
@@ -296,7 +318,8 @@ function run(renderer, models) {
     const facts = [
       [`${"AB"[i]} page`, model.pages.map((p) => `${p.width} × ${p.height}`).join(", ")],
       ["holds", `${page.quantity}, ${page.isHalf ? "half" : "single"} floats`],
-      ["charts", model.charts.toLocaleString("en")], ["triangles", model.triangles.toLocaleString("en")],
+      ["charts", model.charts.toLocaleString("en")],
+      ...(model.elements ? [["elements", model.elements.userData.count.toLocaleString("en")]] : []), ["triangles", model.triangles.toLocaleString("en")],
       ["file", `${short(model.bytes / 1024)} KiB`],
     ];
     for (const [name, text] of facts) {

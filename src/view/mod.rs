@@ -21,10 +21,11 @@ const STYLE: &str = include_str!("page.css");
 pub const LICENCE: &str = include_str!("three.LICENSE.txt");
 
 /// Name and text of each module; the last one starts the page.
-const MODULES: [(&str, &str); 7] = [
+const MODULES: [(&str, &str); 8] = [
     ("three", include_str!("three.bundle.min.js")),
     ("view/light", include_str!("light.js")),
     ("view/shader", include_str!("shader.js")),
+    ("view/elements", include_str!("elements.js")),
     ("view/model", include_str!("model.js")),
     ("view/legend", include_str!("legend.js")),
     ("view/atlas", include_str!("atlas.js")),

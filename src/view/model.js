@@ -1,7 +1,8 @@
 // A bake: its GLB from the page, as meshes to draw and triangles to ask.
 
 import { Box3, BufferAttribute, GLTFLoader, Mesh, Scene, Vector3 } from "three";
-import { decodePage, luminance, sample, scaleOf } from "view/light";
+import { readElements } from "view/elements";
+import { decodePage, isIrradiance, luminance, sample, scaleOf } from "view/light";
 import { surfaceMaterial } from "view/shader";
 
 const EXTENSION = "COBAKE_lightmap";
@@ -23,6 +24,7 @@ export async function loadModel(index, { name, scene, bytes }) {
   for (const { bufferView, quantity } of extension.lightmaps) {
     pages.push(decodePage(await gltf.parser.getDependency("bufferView", bufferView), quantity ?? "irradiance"));
   }
+  const elements = extension.elements ? await readElements(gltf.parser, extension.elements) : null;
   const root = gltf.scenes[scene ?? json.scene ?? 0];
   root.updateMatrixWorld(true);
   const drawn = new Scene();
@@ -36,7 +38,7 @@ export async function loadModel(index, { name, scene, bytes }) {
   const charts = numberCharts(drawn.children, pages);
   const triangles = drawn.children.reduce((sum, mesh) => sum + mesh.geometry.attributes.position.count / 3, 0);
   const box = new Box3().setFromObject(drawn);
-  return { name, bytes, scene: drawn, pages, camera, charts, triangles, box, baked: extension.baked ?? {} };
+  return { name, bytes, scene: drawn, pages, camera, charts, triangles, box, elements, baked: extension.baked ?? {} };
 }
 
 /** One primitive of one node, its triangles taken apart, so that each knows its corners. */
@@ -145,9 +147,9 @@ export function probe(model, raycaster) {
   const inPage = (i) => new Vector3(uv1.getX(i) * page.width, uv1.getY(i) * page.height, 0);
   const area = inPage(b).sub(inPage(a)).cross(inPage(c).sub(inPage(a))).length();
   const value = sample(page, u, v);
-  const light = page.quantity === "radiosity" ? value : value.map((c) => c * scaleOf(page.quantity));
+  const light = value.map((c) => c * scaleOf(page.quantity));
   return {
     ...found, page, pageIndex: userData.pageIndex, u, v, x: u * page.width, y: v * page.height, light,
-    luminance: luminance(light), density: Math.sqrt(area / cross.length()),
+    luminance: luminance(light), isIrradiance: isIrradiance(page.quantity), density: Math.sqrt(area / cross.length()),
   };
 }

@@ -4,10 +4,10 @@ import { DoubleSide, FrontSide, GLSL3, Matrix3, ShaderMaterial, Vector2, Vector3
 import { DIVERGING, VIRIDIS } from "view/legend";
 import { scaleOf } from "view/light";
 
-export const MODES = ["lit", "light", "false", "difference", "charts"];
+export const MODES = ["lit", "light", "false", "difference", "charts", "elements"];
 
 /** The mode that writes the light's brightness and the place in space, for the difference. */
-export const MEASURE = 5;
+export const MEASURE = MODES.length;
 
 /** Uniforms that all surfaces share. */
 export const shared = {
@@ -95,7 +95,8 @@ void main() {
   vec3 shone = emission;
   if (hasEmissionMap) shone *= texture(emissionMap, (emissionTransform * vec3(vEmissionUv, 1.0)).xy).rgb;
   vec3 value = hasPage ? stored(vUv1) : vec3(0.0);
-  vec3 E = isRadiosity ? max(value - PI * shone, 0.0) / max(albedo, vec3(1e-6)) : value * pageScale;
+  // Radiosity stays what it is: a dark albedo would make much of its rounding.
+  vec3 E = value * pageScale;
   if (mode == ${MEASURE}) { pixel = vec4(hasPage ? brightness(E) : -1.0, vPlace); return; }
   vec3 c;
   if (mode == 0) c = encoded(toned(exposure * (isRadiosity ? value / PI : albedo * E / PI + shone)));
@@ -108,7 +109,8 @@ void main() {
     // At an edge the pixel's middle may lie beside this surface, where B shows another one.
     bool isSame = b.r >= 0.0 && distance(b.gba, vPlace) < 0.1 * length(fwidth(vPlace)) + 1e-6 * length(vPlace);
     c = isSame ? diverging(0.5 + 0.5 * (b.r - a) / max(a, 1e-9 * high) / differenceRange) : vec3(0.3);
-  } else c = hue(vChart) * (0.75 + 0.25 * clamp(log(max(brightness(E), 1e-20) / low) / log(high / low), 0.0, 1.0));
+  } else if (mode == 5) c = vec3(0.16);
+  else c = hue(vChart) * (0.75 + 0.25 * clamp(log(max(brightness(E), 1e-20) / low) / log(high / low), 0.0, 1.0));
   if (grid > 0.0 && hasPage) {
     vec2 t = vUv1 * vec2(textureSize(page, 0)), w = max(fwidth(t), vec2(1e-6));
     vec2 line = 1.0 - clamp(min(fract(t), 1.0 - fract(t)) / w, 0.0, 1.0);

@@ -225,6 +225,7 @@ impl Results {
             lightmap: &self.lightmap,
             preview: None,
             mesh: &self.mesh,
+            facets: &[],
             options: &self.options,
         }
     }

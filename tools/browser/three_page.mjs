@@ -32,29 +32,13 @@ async function useExr(gltf) {
   gltf.scene.traverse(({ material }) => material?.lightMap && Object.assign(material, { lightMap: texture, lightMapIntensity: 1 }));
 }
 
-/**
- * Looks straight at each place, [x, y, z, nx, ny, nz], from close by, and returns the RGB of the pixel in the middle
- * and the material's colour. `exr` takes the EXR instead of the PNG. UV 0 is set to zero: it must not matter.
- */
-globalThis.renderWithThree = async (base64, places, exr) => {
-  const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0)).buffer;
-  const gltf = await new GLTFLoader().register((parser) => new MozLightmap(parser)).parseAsync(bytes, "");
-  if (exr) await useExr(gltf);
-  gltf.scene.traverse(({ geometry }) => {
-    // Both sets may be one accessor; only the first is zeroed.
-    geometry?.setAttribute("uv", new BufferAttribute(new Float32Array(2 * geometry.attributes.position.count), 2));
-  });
-  // The standard material takes 1.5 % of the light away for a dielectric's gloss (r187, seen straight on).
-  gltf.scene.traverse((mesh) => {
-    if (!mesh.isMesh) return;
-    const { color, emissive, emissiveIntensity, lightMap, lightMapIntensity } = mesh.material;
-    mesh.material = new MeshLambertMaterial({ color, emissive, emissiveIntensity, lightMap, lightMapIntensity });
-  });
+/** The light that reaches a camera close by each place, [x, y, z, nx, ny, nz]: the RGB of the pixel in the middle. */
+function look(content, places) {
   const renderer = new WebGLRenderer({ antialias: false });
   renderer.toneMapping = NoToneMapping;
   const target = new WebGLRenderTarget(9, 9, { type: FloatType, minFilter: NearestFilter, magFilter: NearestFilter });
   const scene = new Scene();
-  scene.add(gltf.scene);
+  scene.add(content);
   scene.updateMatrixWorld(true);
   const camera = new OrthographicCamera(-1e-5, 1e-5, 1e-5, -1e-5, 1e-4, 0.02);
   return places.map((place) => {
@@ -67,12 +51,39 @@ globalThis.renderWithThree = async (base64, places, exr) => {
     renderer.render(scene, camera);
     const pixels = new Float32Array(4 * 81);
     renderer.readRenderTargetPixels(target, 0, 0, 9, 9, pixels);
-    const hit = new Raycaster(camera.position, normal.clone().negate()).intersectObject(scene, true)[0];
-    const { color, emissive, emissiveIntensity } = hit.object.material;
-    return {
-      seen: [...pixels.slice(160, 163)],
-      albedo: color.toArray(),
-      emission: emissive.toArray().map((c) => c * emissiveIntensity),
-    };
+    const { object } = new Raycaster(camera.position, normal.clone().negate()).intersectObject(scene, true)[0];
+    return { seen: [...pixels.slice(160, 163)], material: object.material };
   });
+}
+
+/** UV 0 is set to zero: it must not matter. Both sets may be one accessor; only the first is zeroed. */
+function zeroFirstSet(gltf) {
+  gltf.scene.traverse(({ geometry }) => {
+    geometry?.setAttribute("uv", new BufferAttribute(new Float32Array(2 * geometry.attributes.position.count), 2));
+  });
+}
+
+const decoded = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0)).buffer;
+
+/** What is seen at each place of a file as it is, a preview for instance. */
+globalThis.showWithThree = async (base64, places) => {
+  const gltf = await new GLTFLoader().parseAsync(decoded(base64), "");
+  zeroFirstSet(gltf);
+  return look(gltf.scene, places).map(({ seen }) => seen);
+};
+
+/** What is seen at each place, and the material's colour. `exr` takes the EXR instead of the PNG. */
+globalThis.renderWithThree = async (base64, places, exr) => {
+  const gltf = await new GLTFLoader().register((parser) => new MozLightmap(parser)).parseAsync(decoded(base64), "");
+  if (exr) await useExr(gltf);
+  zeroFirstSet(gltf);
+  // The standard material takes 1.5 % of the light away for a dielectric's gloss (r187, seen straight on).
+  gltf.scene.traverse((mesh) => {
+    if (!mesh.isMesh) return;
+    const { color, emissive, emissiveIntensity, lightMap, lightMapIntensity } = mesh.material;
+    mesh.material = new MeshLambertMaterial({ color, emissive, emissiveIntensity, lightMap, lightMapIntensity });
+  });
+  return look(gltf.scene, places).map(({ seen, material: { color, emissive, emissiveIntensity } }) => ({
+    seen, albedo: color.toArray(), emission: emissive.toArray().map((c) => c * emissiveIntensity),
+  }));
 };

@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { execFile, spawn } from "node:child_process";
 import { mkdtemp, readFile, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
+import { fileURLToPath } from "node:url";
 import { join } from "node:path";
 import { once } from "node:events";
 import { promisify } from "node:util";
@@ -120,11 +121,90 @@ async function probeTells(page, { program, a, b }) {
   assert.ok(asked >= 2 * PLACES.length - 4, `only ${asked} probes hit a surface`);
 }
 
+/** Bakes fixtures/cornell with `words`, and hands the file to `test`. */
+async function withBake(program, words, test) {
+  const folder = await mkdtemp(join(tmpdir(), "cobake-view-"));
+  try {
+    const file = join(folder, "own.glb");
+    const scene = fileURLToPath(new URL("../../fixtures/cornell/scene.glb", import.meta.url));
+    await run(program, ["bake", scene, "-o", file, "--size", "128", "--quiet", ...words]);
+    await test(file);
+  } finally {
+    await rm(folder, { recursive: true });
+  }
+}
+
+/** Radiance times pi is irradiance: the probe says so, and the same light in either form does not differ. */
+const radianceIsIrradiance = (given) =>
+  withBake(given.program, ["--quantity", "radiance"], (file) =>
+    withPage({ ...given, b: file }, async (page) => {
+      await probeTells(page, { ...given, b: file });
+      await page.mouse.move(0.31 * 960, 0.83 * 640);
+      await settle(page);
+      const { values } = await found(page);
+      assert.ok(values[0].isIrradiance && values[1].isIrradiance);
+      const change = Number((await page.locator("#probe dl").textContent()).match(/B against A([-+\d.]+) %/)[1]);
+      assert.ok(Math.abs(change) < 0.2, `radiance against irradiance: ${change} %`);
+    }));
+
+const radiosityStays = (given) =>
+  withBake(given.program, ["--quantity", "radiosity"], (file) =>
+    withPage({ ...given, b: file }, async (page) => {
+      await page.mouse.move(0.31 * 960, 0.83 * 640);
+      await settle(page);
+      const { values } = await found(page);
+      assert.ok(values[0].isIrradiance && !values[1].isIrradiance);
+      // Surfaces that do not glow send out what they reflect, and reflect less than all.
+      assert.ok(values[1].luminance < 0.96 * values[0].luminance, `${values[1].luminance}, ${values[0].luminance}`);
+      assert.match(await page.locator("#probe dl").textContent(), /B radiosity.*do not compare/);
+      assert.ok(await page.locator('[data-mode="difference"]').isDisabled(), "no number says how far they are apart");
+      await page.keyboard.press("3");
+      await settle(page);
+      assert.match(await page.locator("#legend").textContent(), /Irradiance of A, Radiosity of B/);
+    }));
+
+/** Counts the scene's pixels near each of three colours. */
+async function shares(page, colours) {
+  await settle(page);
+  const png = (await page.screenshot({ clip: { x: 0, y: 60, width: 600, height: 400 } })).toString("base64");
+  return page.evaluate(async ([png, colours]) => {
+    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${png}`)).blob());
+    const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    return colours.map((colour) => {
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4) count += colour.every((c, k) => Math.abs(data[i + k] - c) < 6);
+      return (4 * count) / data.length;
+    });
+  }, [png, colours]);
+}
+
+const elementsShow = (given) =>
+  // Light from the mesh alone, and elements as small as this, let many buffers be asked.
+  withBake(given.program, ["--elements", "--direct", "mesh", "--subdivision-threshold", "0.02"], (file) =>
+    withPage({ ...given, a: file }, async (page) => {
+      await page.keyboard.press("b"); // all A
+      const plain = await page.locator("#facts dl").textContent();
+      assert.match(plain, /elements[\d,]+/);
+      const states = [[176, 176, 176], [86, 140, 205], [238, 144, 44]];
+      await page.keyboard.press("6");
+      const [, empty, notEmpty] = await shares(page, states);
+      assert.ok(empty > 0.02 && notEmpty > 0.001, `blue ${empty}, orange ${notEmpty}`);
+      assert.match(await page.locator("#legend").textContent(), /never asked.*empty.*not empty/);
+      await page.keyboard.press("2");
+      const lines = [[255, 140, 217]];
+      assert.ok((await shares(page, lines))[0] < 1e-4);
+      await page.keyboard.press("m");
+      assert.ok((await shares(page, lines))[0] > 1e-3, "the elements' outlines");
+    }));
+
 async function helpAndPage(page) {
   await page.keyboard.press("p");
   assert.ok(await page.locator("#atlas").isVisible());
   await page.keyboard.press("?");
   assert.ok(await page.locator("#help").isVisible());
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), "Close", "what Enter does first");
   await page.keyboard.press("Escape");
   assert.ok(!(await page.locator("#help").isVisible()));
 }
@@ -138,6 +218,7 @@ async function served({ browser, program, a }) {
     await ready(page);
     assert.ok((await look(page)).span > 40);
     assert.ok(await page.locator('[data-mode="difference"]').isDisabled(), "there is no B");
+    assert.ok(await page.locator('[data-mode="elements"]').isDisabled(), "there are no elements");
     assert.equal((await fetch(`${address}favicon.ico`)).status, 404);
     await page.close();
     // Browsers ask for an icon that the page does not have.
@@ -163,6 +244,9 @@ export const viewCases = [
   ["view: + and - change the exposure", (given) => withPage(given, exposureKeys)],
   ["view: the bar parts A and B", (given) => withPage(given, swipeParts)],
   ["view: the probe tells what cobake knows", (given) => withPage(given, (page) => probeTells(page, given))],
+  ["view: radiance is shown as irradiance", radianceIsIrradiance],
+  ["view: radiosity stays radiosity", radiosityStays],
+  ["view: elements and their buffers' states", elementsShow],
   ["view: the page and the help open and close", (given) => withPage(given, helpAndPage)],
   ["view: served to this machine", served],
   ["view: the same bakes give the same bytes", sameBytes],

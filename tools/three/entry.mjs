@@ -1,6 +1,6 @@
 // What the page of `cobake view` uses of three.js; esbuild leaves the rest out.
 export {
-  Box3, BufferAttribute, Color, DataTexture, DataUtils, DoubleSide, FloatType, FrontSide, GLSL3, HalfFloatType, Matrix3,
+  Box3, BufferAttribute, BufferGeometry, Color, DataTexture, DataUtils, DoubleSide, FloatType, FrontSide, GLSL3, HalfFloatType, Matrix3,
   Mesh, NearestFilter, PerspectiveCamera, Raycaster, RGBAFormat, Scene, ShaderMaterial, Vector2, Vector3, WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
