@@ -12,7 +12,8 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 34] = [
+const OPTIONS: [&str; 35] = [
+    "--pages",
     "--separate",
     "--for",
     "--exr",
