@@ -19,6 +19,7 @@ use cobake::export::{decode_exr, encode, encode_png, verify};
 use cobake::options::{Quantity, Topology};
 use cobake::raster::Lightmap;
 use cobake::scene::SourceDocument;
+use cobake::unwrap::PageArea;
 use fixture::{Maker, Results, document, vectors};
 use glam::{DVec2, DVec3};
 use serde_json::{Value, json};
@@ -534,6 +535,7 @@ fn damage(value: &mut Value, pick: &mut usize, by: &Value) -> bool {
 fn damaged_documents_never_panic() {
     let mut results = results();
     results.lightmap = Lightmap { width: 1, height: 1, texels: vec![[1.0; 3]] };
+    results.atlas.pages = vec![PageArea { row: 0, width: 1, height: 1 }];
     let whole = results.scene.source.json.clone();
     let (mut written, mut refused) = (0, 0);
     for by in [json!(0), json!(3), json!(-1), json!(1_000_000), json!(0.5)] {

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use cobake::options::Topology;
 use cobake::raster::Lightmap;
+use cobake::unwrap::PageArea;
 use glam::{DVec2, DVec3};
 use serde_json::Value;
 
@@ -396,6 +397,7 @@ fn bad_cuts_never_panic() {
     }
     let mut results = Results::of(quilt(false)).cut_up(Cut::Slanted, 2, 2);
     results.lightmap = Lightmap { width: 1, height: 1, texels: vec![[1.0; 3]] };
+    results.atlas.pages = vec![PageArea { row: 0, width: 1, height: 1 }];
     let whole = results.scene.source.json.clone();
     let (mut written, mut refused) = (0, 0);
     for by in [0.into(), 3.into(), (-1).into(), 1_000_000.into()] {
