@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
 use crate::export::{Baked, encode};
-use crate::options::BakeOptions;
+use crate::options::{BakeOptions, Resolution};
 use crate::progress::{Progress, Stage};
 use crate::raster::{Lighting, Lightmap, RasterInput};
 use crate::report::{Recorder, Report};
@@ -17,7 +17,7 @@ use crate::scene::{ImportOptions, Scene};
 use crate::solve::{Problem, Solution, solve};
 use crate::surface::{Geometry, Surface, build_surfaces};
 use crate::trace::Tracer;
-use crate::unwrap::Atlas;
+use crate::unwrap::{Atlas, check_side};
 use page::{Page, PageMaker};
 use scale::Scale;
 use written::Written;
@@ -98,6 +98,9 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     account::warn_of_surfaces(&set, &mut recorder);
     account::warn_of_reflectance(scene, options, &mut recorder);
     let surfaces = set.surfaces;
+    if let Resolution::Size(side) = options.resolution {
+        check_side(surfaces.len(), side, options.padding)?;
+    }
     let weights = weights::of_surfaces(scene, &surfaces, options)?;
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
     let scale = Scale::of(&surfaces, options);

@@ -7,6 +7,7 @@
 //! what all reflect in the end is gathered by the elements ([`mod@gather`]).
 
 pub mod budget;
+mod cluster;
 pub mod contact;
 pub mod direct;
 pub mod emitter;
@@ -32,7 +33,7 @@ use crate::surface::Surface;
 use crate::trace::Tracer;
 use budget::{COARSEST, Round, affordable_error};
 use direct::{DirectPass, ShotCounts};
-use emitter::{AreaEmitter, Emitter};
+use emitter::Emitter;
 use field::RadiosityField;
 use gather::{GatherCounts, Source, gather};
 use hemisphere::Directions;
@@ -254,15 +255,13 @@ fn darken(elements: &[Vec<Receiver>], facets: &mut [Facet]) {
     }
 }
 
-/// Glowing regions and punctual lights, each the strongest first; ties keep the scene's order.
+/// Glowing regions, in clusters where they are many, and punctual lights, each the strongest first; ties keep the
+/// scene's order.
 fn emitters(problem: &Problem, facets: &[Facet]) -> (Vec<Emitter>, Vec<Emitter>) {
-    let mut glowing = Vec::new();
-    for facet in facets.iter().filter(|f| f.exitance.max_element() > 0.0) {
-        let area = facet.elements[0].area;
-        glowing.push(Emitter::Area(AreaEmitter::new(facet.frame, facet.parts(0), area, facet.exitance)));
-    }
-    let mut lights: Vec<Emitter> = problem.lights.iter().map(|&l| Emitter::Punctual(l)).collect();
     let diagonal = problem.tracer.diagonal();
+    let mut glowing: Vec<Emitter> =
+        cluster::glowing(facets, diagonal).into_iter().map(Emitter::Area).collect();
+    let mut lights: Vec<Emitter> = problem.lights.iter().map(|&l| Emitter::Punctual(l)).collect();
     let power = |e: &Emitter| luminance(e.power(diagonal));
     for list in [&mut glowing, &mut lights] {
         list.sort_by(|a, b| power(b).total_cmp(&power(a)));

@@ -1,5 +1,9 @@
 //! Texels where the light needs them: less error from as many texels, no gaps, no overlaps, no seams.
 
+use cobake::bake_scene;
+use cobake::error::Error;
+use cobake::progress::{Progress, Stage};
+use cobake::unwrap::UnwrapError;
 use glam::{DVec2, DVec3};
 
 use crate::model::{Baked, Model, by_light, cuboid, down, glow, paint, sized, up, v};
@@ -120,4 +124,31 @@ fn cuts_do_not_show() {
     jumps.sort_by(f64::total_cmp);
     let at = |share: f64| jumps[(share * (jumps.len() - 1) as f64) as usize];
     assert!(jumps.len() > 100 && at(0.5) < 0.001 && at(0.95) < 0.02, "{} {}", at(0.5), at(0.95));
+}
+
+/// The stages that a bake came to.
+#[derive(Default)]
+struct Stages(Vec<Stage>);
+
+impl Progress for Stages {
+    fn begin(&mut self, stage: Stage) {
+        self.0.push(stage);
+    }
+    fn advance(&mut self, _: f64) {}
+    fn warn(&mut self, _: &str) {}
+}
+
+/// 20 boxes have 120 faces; of the smallest charts 64 fit into 16 × 16 texels.
+#[test]
+fn a_page_that_can_hold_no_texel_a_chart_is_refused_before_light_is_solved() {
+    let boxes = (0..20).map(|k| v(f64::from(k), 0.0, 0.0));
+    let triangles: Vec<_> = boxes.flat_map(|p| cuboid(p, p + v(0.5, 0.5, 0.5))).collect();
+    let scene = Model::new().add(&glow(EMITTED), &triangles).scene();
+    let mut stages = Stages::default();
+    let refused = bake_scene(&scene, &sized(16), &mut stages).expect_err("too small");
+    assert!(
+        matches!(refused, Error::Unwrap(UnwrapError::TooSmall { charts: 120, side: 16, .. })),
+        "{refused}"
+    );
+    assert_eq!(stages.0.last(), Some(&Stage::Surfaces));
 }
