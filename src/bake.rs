@@ -99,7 +99,7 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     account::warn_of_reflectance(scene, options, &mut recorder);
     let surfaces = set.surfaces;
     if let Resolution::Size(side) = options.resolution {
-        check_side(surfaces.len(), side, options.padding)?;
+        check_side(surfaces.len(), (side, options.pages), options.padding)?;
     }
     let weights = weights::of_surfaces(scene, &surfaces, options)?;
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);

@@ -205,14 +205,14 @@ pub fn unwrap_groups(
     }
 }
 
-/// Refuses a square page of this side if so many charts cannot fit, however small they are and whatever lies between:
+/// Refuses square pages of this side if so many charts cannot fit, however small they are and whatever lies between:
 /// lookups in the smallest touch two by two texels.
 ///
 /// # Errors
 ///
 /// [`UnwrapError::TooSmall`].
-pub fn check_side(charts: usize, side: u32, padding: Option<u32>) -> Result<(), UnwrapError> {
-    let fit = u64::from(side / 2).pow(2);
+pub fn check_side(charts: usize, (side, pages): (u32, u32), padding: Option<u32>) -> Result<(), UnwrapError> {
+    let fit = u64::from(pages) * u64::from(side / 2).pow(2);
     if charts as u64 <= fit {
         return Ok(());
     }
