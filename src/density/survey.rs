@@ -341,3 +341,45 @@ impl Quarter {
         Cell { min: self.min, max: self.max, energy, levels: self.levels }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples of light that grows by one a metre along x, and by a hundred along y.
+    fn samples_of(tile: &Tile) -> Vec<Option<Vec3>> {
+        let [columns, rows] = tile.cells.map(|c| c + 1);
+        let cell = (tile.max - tile.min) / DVec2::new(tile.cells[0] as f64, tile.cells[1] as f64);
+        let at = |k: usize| tile.min + cell * DVec2::new((k % columns) as f64, (k / columns) as f64);
+        (0..columns * rows).map(|k| Some(Vec3::splat(at(k).dot(DVec2::new(1.0, 100.0)) as f32))).collect()
+    }
+
+    #[test]
+    fn nodes_that_a_tile_shares_with_the_coarser_one_are_handed_down() {
+        let tile = |min, max, levels| Tile {
+            surface: 0,
+            min,
+            max,
+            cells: [8, 4],
+            levels,
+            blind_spacing: 1.0,
+            coarser: None,
+        };
+        let whole = tile(DVec2::new(2.0, 1.0), DVec2::new(18.0, 9.0), [3, 2]);
+        let found = Arc::new(Found { light: samples_of(&whole), shadowing: None });
+        let half = 0.5 * (whole.max - whole.min);
+        for at in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let min = whole.min + half * DVec2::new(at[0] as f64, at[1] as f64);
+            let quarter = tile(min, min + half, [4, 3]);
+            let coarser = Coarser { energy: Energy::default(), found: Arc::clone(&found), at };
+            let expected = samples_of(&quarter);
+            let mut count = 0;
+            for (k, expected) in expected.iter().enumerate() {
+                let known = quarter.known(&coarser, [k % 9, k / 9]);
+                count += usize::from(known.is_some());
+                assert!(known.is_none_or(|l| Some(l.irradiance.as_vec3()) == *expected), "{at:?}, node {k}");
+            }
+            assert_eq!(count, 5 * 3, "every other node along either axis");
+        }
+    }
+}
