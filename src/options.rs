@@ -73,6 +73,18 @@ pub enum Quantity {
     Radiosity,
 }
 
+impl Quantity {
+    /// As it is typed and written.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Irradiance => "irradiance",
+            Self::Radiance => "radiance",
+            Self::Radiosity => "radiosity",
+        }
+    }
+}
+
 /// What viewers that know no lightmaps are shown in place of the scene's materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]

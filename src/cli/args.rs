@@ -320,20 +320,10 @@ impl BakeArgs {
     /// What of the explicit options is not what the engine reads; the user has the last word.
     pub(crate) fn doubt(&self) -> Option<String> {
         let (engine, typed) = (self.engine?, Quantity::from(self.quantity?));
-        let (takes, typed) = (word(engine.quantity()), (word(typed), typed));
-        (typed.1 != engine.quantity()).then(|| {
-            let (name, typed) = (engine.word(), typed.0);
+        (typed != engine.quantity()).then(|| {
+            let (name, typed, takes) = (engine.word(), typed.name(), engine.quantity().name());
             format!("--quantity {typed} is written as told, but {name} reads {takes}; leave --quantity out")
         })
-    }
-}
-
-/// A quantity as it is typed.
-fn word(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Radiance => "radiance",
-        Quantity::Radiosity => "radiosity",
-        _ => "irradiance",
     }
 }
 

@@ -1,10 +1,10 @@
 //! `cobake bake`: a scene in, a lightmapped scene out.
 
+use std::path::PathBuf;
+
 use anyhow::Context;
 use cobake::BakeResult;
 use cobake::error::Error;
-use std::path::PathBuf;
-
 use cobake::export::{
     SidecarForm, WrittenFile, buffer_beside, file_of, referenced_files, separate, write_all, write_whole,
 };

@@ -79,16 +79,12 @@ fn as_text(file: &Path, found: &Inspection, bytes: u64) -> String {
         row("vertices", found.vertices.to_string()),
     ];
     for (index, page) in found.pages.iter().enumerate() {
-        let (quantity, unit) = match page.quantity {
-            Quantity::Radiance => ("radiance", "nits"),
-            Quantity::Radiosity => ("radiosity", "lux"),
-            _ => ("irradiance", "lux"),
-        };
+        let unit = if page.quantity == Quantity::Radiance { "nits" } else { "lux" };
         rows.push(row(
             "page",
             format!("{index}: {} × {} texels, {} bytes", page.width, page.height, page.bytes),
         ));
-        rows.push(row(quantity, format!("luminance {}, {unit}", reach(page.luminance))));
+        rows.push(row(page.quantity.name(), format!("luminance {}, {unit}", reach(page.luminance))));
         rows.push(row("charts", format!("{}, on {:.1} % of the page", page.charts, 100.0 * page.coverage)));
         rows.push(row("density", format!("{}, texels a metre", reach(page.density))));
     }

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use cobake::compare::{PairFigures, ReferenceFigures, SetFigures};
-use cobake::options::Quantity;
 
 /// The figures of a comparison with reference points, a row a set.
 pub(crate) fn reference(baked: &Path, points: &Path, figures: &ReferenceFigures) -> String {
@@ -28,11 +27,7 @@ fn row(name: &str, set: &SetFigures) -> [String; 11] {
 
 /// The figures of a comparison of two bakes; `scale` is the heat map's, where one was drawn.
 pub(crate) fn pair(a: &Path, b: &Path, figures: &PairFigures, scale: Option<f64>) -> String {
-    let quantity = match figures.quantity {
-        Quantity::Radiance => "radiance",
-        Quantity::Radiosity => "radiosity",
-        _ => "irradiance",
-    };
+    let quantity = figures.quantity.name();
     let flip = &figures.flip;
     let rows = [
         ["points", &figures.points.to_string(), "spread evenly over A's surfaces"],

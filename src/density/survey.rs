@@ -231,22 +231,16 @@ impl Tile {
             ),
         };
         let size = (self.cells[0] as u32 + 1, self.cells[1] as u32 + 1);
-        let mut look = match &self.coarser {
+        let look = match &self.coarser {
             None => lighting.at_centres(&chart, size, None),
             Some(coarser) => {
-                let is_known = |node: [u32; 2]| self.known(coarser, node.map(|n| n as usize)).is_some();
-                let closer = CloserLook { is_known: &is_known, shadowing: coarser.found.shadowing.as_ref() };
+                let columns = self.cells[0] + 1;
+                let nodes = 0..self.samples() as usize;
+                let known: Vec<_> = nodes.map(|k| self.known(coarser, [k % columns, k / columns])).collect();
+                let closer = CloserLook { light: &known, shadowing: coarser.found.shadowing.as_ref() };
                 lighting.at_centres(&chart, size, Some(&closer))
             }
         };
-        if let Some(coarser) = &self.coarser {
-            for (index, light) in look.light.iter_mut().enumerate() {
-                let node = [index % size.0 as usize, index / size.0 as usize];
-                if let Some(known) = self.known(coarser, node) {
-                    *light = Some(known);
-                }
-            }
-        }
         let centre =
             |light: &Option<PointLight>| light.and_then(|l| l.is_centre.then(|| l.irradiance.as_vec3()));
         let found = Found { light: look.light.iter().map(centre).collect(), shadowing: look.shadowing };

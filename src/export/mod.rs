@@ -62,7 +62,7 @@ pub use png::{Png, encode_png};
 pub use preview::{encode_preview, encode_previews};
 pub use separate::{buffer_beside, referenced_files, separate};
 pub use sidecar::{SidecarForm, encode_sidecar};
-pub use verify::{lightmap_bytes, verify};
+pub use verify::verify;
 pub use write::{WrittenFile, file_of, write, write_all, write_whole};
 pub(crate) use writer::COBAKE_LIGHTMAP;
 

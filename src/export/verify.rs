@@ -54,20 +54,6 @@ pub fn verify(glb: &[u8]) -> Result<(), ExportError> {
     Ok(())
 }
 
-/// The size of the lightmaps' EXRs, bytes; 0 if `glb` holds none.
-#[must_use]
-pub fn lightmap_bytes(glb: &[u8]) -> u64 {
-    let length = |json: &Value| {
-        let lightmaps = json.get("extensions")?.get(COBAKE_LIGHTMAP)?.get("lightmaps")?.as_array()?;
-        let views = json.get("bufferViews")?;
-        let lengths = lightmaps
-            .iter()
-            .map(|lightmap| views.get(index_of(lightmap.get("bufferView"))?)?.get("byteLength")?.as_u64());
-        lengths.sum::<Option<u64>>()
-    };
-    glb::unpack(glb).ok().and_then(|(json, _)| length(&json)).unwrap_or(0)
-}
-
 /// Checks that the `gltf` crate accepts the output, where it accepted the source.
 ///
 /// That crate refuses what our own reader puts up with, so a refusal only counts as ours if the

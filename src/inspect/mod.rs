@@ -11,6 +11,7 @@ use crate::compare::{BakedScene, CompareError};
 use crate::export::COBAKE_LIGHTMAP;
 use crate::geom::polygon::signed_area;
 use crate::geom::triangle::area;
+use crate::light;
 use crate::options::Quantity;
 use crate::raster::Lightmap;
 
@@ -126,10 +127,7 @@ fn inspect_page(
 }
 
 fn luminance(map: &Lightmap) -> Range {
-    let values = map
-        .texels
-        .iter()
-        .map(|&[r, g, b]| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b));
+    let values = map.texels.iter().map(|texel| light::luminance(DVec3::from_array(texel.map(f64::from))));
     Range::of(values.filter(|&value| value > 0.0).map(|value| (value, 1.0)))
 }
 

@@ -130,12 +130,8 @@ impl DirectLight<'_> {
         texels: &mut [LitTexel],
     ) -> (TexelWays, Effort) {
         let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
-        let plane_from_texel = chart.texel_from_plane.inverse();
-        let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
-        let outline = &chart.outline;
-        for emitter in self.emitters {
-            let work = Shining { light: self, surface, outline, plane_from_texel, cover, emitter };
-            let extent = extent(texels);
+        let extent = extent(texels);
+        for work in self.shinings(surface, chart) {
             let done = work.shine_on(texels, extent, Inherited { between: None, texels: usize::MAX });
             ways.add(&done.ways);
             effort.add(done.effort);
@@ -150,9 +146,7 @@ impl DirectLight<'_> {
         }
         (ways, effort)
     }
-}
 
-impl DirectLight<'_> {
     /// Adds what all emitters send to `texels` within a chart that covers a rectangle of a surface, each asked
     /// once. What stands in the way is found among what stands before a larger rectangle, where that is `known`.
     pub(super) fn shine_once(
@@ -162,14 +156,10 @@ impl DirectLight<'_> {
         texels: &mut [LitTexel],
         known: Option<&Shadowing>,
     ) -> Shadowing {
-        let plane_from_texel = chart.texel_from_plane.inverse();
-        let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
-        let outline = &chart.outline;
-        let corners = |pick: fn(DVec2, DVec2) -> DVec2| outline.iter().copied().reduce(pick);
+        let corners = |pick: fn(DVec2, DVec2) -> DVec2| chart.outline.iter().copied().reduce(pick);
         let whole = (corners(DVec2::min).unwrap_or_default(), corners(DVec2::max).unwrap_or_default());
         let extent = extent(texels);
-        let of = |(index, emitter): (usize, &Emitter)| {
-            let work = Shining { light: self, surface, outline, plane_from_texel, cover, emitter };
+        let of = |(index, work): (usize, Shining)| {
             let standing = work.standing(&work.block(whole), known.map(|k| &k.0[index]));
             if !texels.is_empty() {
                 work.shine_past(texels, extent, &work.block(extent), &standing);
@@ -179,7 +169,16 @@ impl DirectLight<'_> {
             }
             standing
         };
-        Shadowing(self.emitters.iter().enumerate().map(of).collect())
+        Shadowing(self.shinings(surface, chart).enumerate().map(of).collect())
+    }
+
+    /// Each emitter shining on a surface's chart.
+    fn shinings<'a>(&'a self, surface: &'a Surface, chart: &'a Chart) -> impl Iterator<Item = Shining<'a>> {
+        let plane_from_texel = chart.texel_from_plane.inverse();
+        let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
+        let outline = &chart.outline;
+        let of = move |emitter| Shining { light: self, surface, outline, plane_from_texel, cover, emitter };
+        self.emitters.iter().map(of)
     }
 }
 

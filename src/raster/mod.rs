@@ -107,8 +107,8 @@ pub struct Look {
 
 /// What is known of a rectangle from a look at a larger one.
 pub struct CloserLook<'a> {
-    /// Whether the light at a texel, column and row, is known.
-    pub is_known: &'a dyn Fn([u32; 2]) -> bool,
+    /// Texel by texel the light that is known.
+    pub light: &'a [Option<PointLight>],
     /// What stands before the larger one.
     pub shadowing: Option<&'a Shadowing>,
 }
@@ -162,14 +162,19 @@ impl<'a> Lighting<'a> {
     }
 
     /// The irradiance at the texel centres of a page of `size` texels that `chart`, a rectangle of its surface,
-    /// alone lies in, row by row; `None` where nothing of the surface that is seen is near, or where light
-    /// [`is known`](CloserLook::is_known).
+    /// alone lies in, row by row; `None` where nothing of the surface that is seen is near. Where light is
+    /// [known](CloserLook::light) it is not evaluated again.
     #[must_use]
     pub fn at_centres(&self, chart: &Chart, size: (u32, u32), closer: Option<&CloserLook>) -> Look {
         let surface = &self.input.surfaces[chart.surface];
         let sites = chart_sites(surface, chart, size, &|region| !self.buried[chart.surface][region]);
+        let mut light = vec![None; size.0 as usize * size.1 as usize];
+        if let Some(closer) = closer {
+            light.copy_from_slice(closer.light);
+        }
+        let place = |[x, y]: [u32; 2]| y as usize * size.0 as usize + x as usize;
         let is_wanted = |site: &TexelSite| {
-            site.position != SitePosition::Buried && !closer.is_some_and(|c| (c.is_known)([site.x, site.y]))
+            site.position != SitePosition::Buried && light[place([site.x, site.y])].is_none()
         };
         let wanted = sites.iter().enumerate().filter(|(_, site)| is_wanted(site));
         let mut texels: Vec<LitTexel> = wanted.map(|(index, site)| LitTexel::new(index, site)).collect();
@@ -178,12 +183,10 @@ impl<'a> Lighting<'a> {
             self.direct(Edges::Once).shine_once(surface, chart, &mut texels, known)
         });
         self.add_indirect(chart.surface, &mut texels);
-        let mut light = vec![None; size.0 as usize * size.1 as usize];
         for texel in &texels {
-            let at = texel.cell[1] as usize * size.0 as usize + texel.cell[0] as usize;
             let irradiance = texel.direct + texel.indirect;
             let is_centre = sites[texel.site].position == SitePosition::Centre;
-            light[at] = Some(PointLight { irradiance, doubtful: texel.doubtful, is_centre });
+            light[place(texel.cell)] = Some(PointLight { irradiance, doubtful: texel.doubtful, is_centre });
         }
         Look { light, shadowing }
     }

@@ -121,33 +121,24 @@ impl<'a> Packed<'a> {
             ("EXPONENTIAL", _) => {
                 self.words(|words| meshopt::decode_filter_exp(words.as_chunks_mut::<1>().0))
             }
-            ("OCTAHEDRAL", 4) => {
-                let mut data = self.vertices::<[i8; 4]>()?;
-                meshopt::decode_filter_oct(&mut data);
-                Ok(data.into_iter().flatten().flat_map(i8::to_le_bytes).collect())
-            }
-            ("OCTAHEDRAL", 8) => {
-                let mut data = self.vertices::<[i16; 4]>()?;
-                meshopt::decode_filter_oct(&mut data);
-                Ok(data.into_iter().flatten().flat_map(i16::to_le_bytes).collect())
-            }
-            ("QUATERNION", 8) => {
-                let mut data = self.vertices::<[i16; 4]>()?;
-                meshopt::decode_filter_quat(&mut data);
-                Ok(data.into_iter().flatten().flat_map(i16::to_le_bytes).collect())
-            }
-            ("COLOR", 4) => {
-                let mut data = self.vertices::<[i8; 4]>()?;
-                meshopt::decode_filter_color(&mut data);
-                Ok(data.into_iter().flatten().flat_map(i8::to_le_bytes).collect())
-            }
-            ("COLOR", 8) => {
-                let mut data = self.vertices::<[i16; 4]>()?;
-                meshopt::decode_filter_color(&mut data);
-                Ok(data.into_iter().flatten().flat_map(i16::to_le_bytes).collect())
-            }
+            ("OCTAHEDRAL", 4) => self.filtered(meshopt::decode_filter_oct, i8::to_le_bytes),
+            ("OCTAHEDRAL", 8) => self.filtered(meshopt::decode_filter_oct, i16::to_le_bytes),
+            ("QUATERNION", 8) => self.filtered(meshopt::decode_filter_quat, i16::to_le_bytes),
+            ("COLOR", 4) => self.filtered(meshopt::decode_filter_color, i8::to_le_bytes),
+            ("COLOR", 8) => self.filtered(meshopt::decode_filter_color, i16::to_le_bytes),
             _ => Err("has a filter that the extension does not define for its byteStride"),
         }
+    }
+
+    /// Vertices of four components, changed by `filter`.
+    fn filtered<C: Clone + Default, const N: usize>(
+        &self,
+        filter: impl Fn(&mut [[C; 4]]),
+        bytes: impl Fn(C) -> [u8; N],
+    ) -> Result<Vec<u8>, &'static str> {
+        let mut data = self.vertices::<[C; 4]>()?;
+        filter(&mut data);
+        Ok(data.into_iter().flatten().flat_map(bytes).collect())
     }
 
     fn vertices<T: Clone + Default>(&self) -> Result<Vec<T>, &'static str> {

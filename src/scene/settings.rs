@@ -115,9 +115,8 @@ struct Motion {
 /// What the document's animations change. Read leniently: a bake needs nothing else of them.
 fn moved_by_animation(json: &Value, count: usize) -> Vec<Motion> {
     let mut moved = vec![Motion::default(); count];
-    let list =
-        |value: &Value, key: &str| value.get(key).and_then(Value::as_array).cloned().unwrap_or_default();
-    for channel in list(json, "animations").iter().flat_map(|animation| list(animation, "channels")) {
+    let channels = list(json, "animations").flat_map(|animation| list(animation, "channels"));
+    for channel in channels {
         let Some(target) = channel.get("target") else { continue };
         let pointer = target.pointer("/extensions/KHR_animation_pointer/pointer").and_then(Value::as_str);
         let (node, path) = match pointer.and_then(|pointer| pointer.strip_prefix("/nodes/")?.split_once('/'))
@@ -136,4 +135,9 @@ fn moved_by_animation(json: &Value, count: usize) -> Vec<Motion> {
         motion.shape |= path.starts_with("weights");
     }
     moved
+}
+
+/// A list's entries; none where there is no list.
+fn list<'v>(value: &'v Value, key: &str) -> impl Iterator<Item = &'v Value> + use<'v> {
+    value.get(key).and_then(Value::as_array).into_iter().flatten()
 }
