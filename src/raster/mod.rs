@@ -13,6 +13,7 @@ mod edge;
 mod fit;
 mod locate;
 mod penumbra;
+mod reflected;
 mod seams;
 mod shadowing;
 mod ways;
@@ -39,6 +40,7 @@ pub use coverage::{SitePosition, TexelSite, sites};
 pub use dilate::dilate;
 use direct::{DirectLight, Edges, LitTexel, texel_steps};
 use locate::TriangleLocator;
+use reflected::fit_reflected;
 pub use seams::SeamReport;
 pub use shadowing::Shadowing;
 pub use ways::TexelWays;
@@ -332,6 +334,7 @@ fn chart_texels(
         (ways, effort) = lighting.direct(Edges::Fitted).shine(&input.surfaces[surface], chart, &mut texels);
     }
     lighting.add_indirect(surface, &mut texels);
+    fit_reflected(lighting, chart, &cover, &mut texels);
     take_after_neighbours(&mut texels, |t| &mut t.indirect);
     for texel in &mut texels {
         texel.direct += texel.indirect;

@@ -21,8 +21,11 @@ impl Round {
         Self { noise: 4.0 * error, tolerance: 12.0 * error }
     }
 
-    /// Follows light into narrow gaps, from one side to the other: elements stay as they are.
-    pub const IN_GAPS: Self = Self { noise: 8.0 * COARSEST, tolerance: f64::INFINITY };
+    /// Follows light into narrow gaps, from one side to the other, after another round: elements stay as they are.
+    #[must_use]
+    pub fn in_gaps(after: Self) -> Self {
+        Self { noise: 2.0 * after.noise, tolerance: f64::INFINITY }
+    }
 
     /// Whether elements may be split.
     #[must_use]

@@ -138,6 +138,18 @@ impl AreaEmitter {
         Self { parts, hull, frame, exitance, area, diameter_squared, grids }
     }
 
+    /// Its plane: the normal is the emitting side's.
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
+    /// `π L`.
+    #[must_use]
+    pub fn exitance(&self) -> DVec3 {
+        self.exitance
+    }
+
     /// The power that leaves it.
     #[must_use]
     pub fn power(&self) -> DVec3 {

@@ -39,8 +39,8 @@ pub struct RadiosityField<'a> {
     patches: Vec<FieldPatch>,
     /// By facet: a node or a leaf.
     roots: Vec<u32>,
-    /// Of facets' hot leaves: what the cap took, mean.
-    excess: HashMap<(usize, u32), DVec3>,
+    /// Of hot leaves, by the number of their patch: what the cap took.
+    excess: HashMap<u32, FieldPatch>,
 }
 
 /// One side of a surface.
@@ -96,9 +96,7 @@ impl<'a> RadiosityField<'a> {
             .zip(hot.leaves(facets))
             .map(|(facet, is_hot)| Tree::new(facet, &surfaces[facet.surface], &is_hot, direct_scale, hot.cap))
             .collect();
-        for (index, tree) in trees.into_iter().enumerate() {
-            field.take(index, tree);
-        }
+        trees.into_iter().for_each(|tree| field.take(tree));
         let mut first = 0;
         for (index, surface) in surfaces.iter().enumerate() {
             let own: Vec<usize> = (first..facets.len()).take_while(|&f| facets[f].surface == index).collect();
@@ -110,7 +108,7 @@ impl<'a> RadiosityField<'a> {
         field
     }
 
-    fn take(&mut self, facet: usize, tree: Tree) {
+    fn take(&mut self, tree: Tree) {
         let (nodes, patches) = (self.nodes.len() as u32, self.patches.len() as u32);
         let numbered = |number: u32| number + if number & LEAF == 0 { nodes } else { patches };
         self.roots.push(numbered(tree.root));
@@ -118,7 +116,7 @@ impl<'a> RadiosityField<'a> {
             tree.nodes.into_iter().map(|node| FieldNode { children: node.children.map(numbered), ..node }),
         );
         self.patches.extend(tree.patches);
-        self.excess.extend(tree.excess.into_iter().map(|(leaf, excess)| ((facet, leaf), excess)));
+        self.excess.extend(tree.excess.into_iter().map(|(patch, excess)| (patch + patches, excess)));
     }
 
     /// Lays the grid over a side whose `facets` are these among `all`.
@@ -175,11 +173,36 @@ impl<'a> RadiosityField<'a> {
     /// Mean radiosity of an element that was set apart.
     #[must_use]
     pub fn mean_excess(&self, index: usize, facet: &Facet, element: u32) -> DVec3 {
-        let leaves = facet.leaves_of(element);
-        let area = |leaf: u32| facet.elements[leaf as usize].area;
-        let excess = |leaf: u32| self.excess.get(&(index, leaf)).copied().unwrap_or_default();
-        let sum: DVec3 = leaves.iter().map(|&l| area(l) * excess(l)).sum();
-        (sum / leaves.iter().map(|&l| area(l)).sum::<f64>()).max(DVec3::ZERO)
+        let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+        for leaf in facet.leaves_of(element) {
+            let e = &facet.elements[leaf as usize];
+            let excess = self.excess_patch((index, facet.surface, facet.side), e.centroid);
+            sum += e.area * excess.map_or(Vec3::ZERO, FieldPatch::mean).as_dvec3();
+            area += e.area;
+        }
+        (sum / area).max(DVec3::ZERO)
+    }
+
+    /// Radiosity that was set apart at a place of a facet, of which index, surface and side are given.
+    #[must_use]
+    pub fn excess_at(&self, facet: (usize, usize, Side), p: DVec2) -> DVec3 {
+        let min = self.sides[side_number(facet)].min;
+        let excess = self.excess_patch(facet, p).map_or(Vec3::ZERO, |e| e.at((p - min).as_vec2()));
+        excess.as_dvec3().max(DVec3::ZERO)
+    }
+
+    fn excess_patch(&self, facet: (usize, usize, Side), p: DVec2) -> Option<&FieldPatch> {
+        let p = (p - self.sides[side_number(facet)].min).as_vec2();
+        self.excess.get(&self.patch_from(self.roots[facet.0], p))
+    }
+
+    /// The patch at `p` under a node or leaf.
+    #[inline]
+    fn patch_from(&self, mut at: u32, p: Vec2) -> u32 {
+        while at & LEAF == 0 {
+            at = self.nodes[at as usize].child(p);
+        }
+        at & !LEAF
     }
 
     /// The radiosity that a ray met at `point`; zero on the back of a single-sided surface.
@@ -202,11 +225,13 @@ impl<'a> RadiosityField<'a> {
                 None => return Vec3::ZERO,
             }
         }
-        while at & LEAF == 0 {
-            at = self.nodes[at as usize].child(p);
-        }
-        self.patches[(at & !LEAF) as usize].at(p)
+        self.patches[self.patch_from(at, p) as usize].at(p)
     }
+}
+
+/// Where a facet's side is among all.
+fn side_number((_, surface, side): (usize, usize, Side)) -> usize {
+    2 * surface + usize::from(side == Side::Back)
 }
 
 /// A side's frame, its least corner there, and its extent.
@@ -227,8 +252,8 @@ struct Tree {
     root: u32,
     nodes: Vec<FieldNode>,
     patches: Vec<FieldPatch>,
-    /// Of hot leaves.
-    excess: Vec<(u32, DVec3)>,
+    /// Of hot leaves, by the number of their patch: what the cap took.
+    excess: Vec<(u32, FieldPatch)>,
 }
 
 impl Tree {
@@ -260,9 +285,10 @@ impl Tree {
             };
             let (corners, middle) = (e.corners().map(radiosity), radiosity(0.5 * (e.min + e.max)));
             let whole = FieldPatch::new(e, min, corners, middle);
+            let number = patches.len() as u32;
             patches.push(if is_hot[leaf as usize] {
                 let cool = FieldPatch::new(e, min, corners.map(|c| capped(c, cap)), capped(middle, cap));
-                excess.push((leaf, (whole.mean() - cool.mean()).as_dvec3()));
+                excess.push((number, whole.without(&cool)));
                 cool
             } else {
                 whole
@@ -295,6 +321,12 @@ impl FieldPatch {
         let [a, b, c, d] = self.corners;
         let s = 2.0 * t - 1.0;
         a.lerp(b, t.x).lerp(d.lerp(c, t.x), t.y) + self.bulge * (1.0 - 0.5 * s.length_squared())
+    }
+
+    /// What it is more than another of the same place.
+    fn without(&self, other: &Self) -> Self {
+        let corners = std::array::from_fn(|i| self.corners[i] - other.corners[i]);
+        Self { corners, bulge: self.bulge - other.bulge, ..*self }
     }
 
     fn mean(&self) -> Vec3 {

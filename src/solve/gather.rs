@@ -18,10 +18,11 @@ use rayon::prelude::*;
 use super::budget::{Contrasts, Round, level_for};
 use super::contact::Nearby;
 use super::direct::DirectPass;
-use super::emitter::{AreaEmitter, Evaluation, Precision, irradiance_by_rays};
+use super::emitter::{Evaluation, Precision, irradiance_by_rays};
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
 use super::hemisphere::{Directions, Level};
+use super::hot::HotSpot;
 use super::patches::Receiver;
 use crate::element::{Facet, Shading};
 use crate::geom::Frame;
@@ -45,6 +46,13 @@ const MOST_SLENDER: f64 = 32.0;
 /// An element that is smaller than the square root of the tolerance times this, in distances to what it sees, is not
 /// asked about its middle: light curves with the square of that (Ward, Rubinstein and Clear 1988).
 const FLAT: f64 = 1.34;
+
+/// Where direct light alone is this many times the scene's mean light, a small error is as much light as a large one
+/// elsewhere,
+const BRIGHT: f64 = 10.0;
+
+/// and elements are split down to this fraction of the threshold.
+const LEAST_WHERE_BRIGHT: f64 = 1.0 / 16.0;
 
 /// A hot spot that gives less than this fraction of the light is left out.
 const HOT_NEGLIGIBLE: f64 = 2e-5;
@@ -85,7 +93,7 @@ pub struct Source<'a> {
     /// What rays read.
     pub field: &'a RadiosityField<'a>,
     /// What is too bright and too small for them.
-    pub hot_spots: &'a [AreaEmitter],
+    pub hot_spots: &'a [HotSpot],
     /// Where all places look.
     pub directions: &'a Directions,
 }
@@ -176,8 +184,7 @@ impl Gathering<'_> {
     fn receive(&mut self, element: u32) {
         let e = &self.facet.elements[element as usize];
         let size = e.size();
-        let least = self.pass.indirect_threshold;
-        if size <= least {
+        if size <= self.least(element) {
             let gathered = self.at(self.facet.centre(element));
             let shading = Shading { corners: [gathered.irradiance; 4], bulge: DVec3::ZERO };
             self.keep(element, shading, gathered.is_enclosed);
@@ -294,6 +301,13 @@ impl Gathering<'_> {
         self.round.tolerance * light.max(LEAST_REFERENCE * self.pass.typical)
     }
 
+    /// An element no larger than this is not split, metres.
+    fn least(&self, element: u32) -> f64 {
+        let (direct, _) = self.facet.received(element, self.facet.elements[element as usize].centroid);
+        let is_bright = luminance(direct) > BRIGHT * self.pass.typical;
+        self.pass.indirect_threshold * if is_bright { LEAST_WHERE_BRIGHT } else { 1.0 }
+    }
+
     fn may_split(&self, element: u32) -> bool {
         match self.pass.options.refine {
             Refine::Gradient | Refine::CobGradient => true,
@@ -313,7 +327,7 @@ impl Gathering<'_> {
         let size = e.max - e.min;
         let [a, b, c, d] = e.corner_values(samples).map(luminance);
         let change = DVec2::new((b + c - a - d).abs(), (c + d - a - b).abs());
-        let least = self.pass.indirect_threshold;
+        let least = self.least(element);
         let clearly = |axis: usize| e.cut.is_none() && change[axis] > CLEARLY * change[1 - axis];
         let along = [0, 1].map(|axis| {
             let is_large = size[axis] > least && size[axis] * MOST_SLENDER > size[1 - axis];
@@ -368,7 +382,8 @@ impl Gathering<'_> {
         self.counts.places += 1;
         self.counts.rays += self.level.rays() as u64;
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
-        let hot = irradiance_by_rays(hot_spots, point, tracer, negligible, &mut self.evaluation);
+        let spots = hot_spots.iter().map(|s| (&s.emitter, || s.exitance_at(point.position, field)));
+        let hot = irradiance_by_rays(spots, point, tracer, negligible, &mut self.evaluation);
         Gathered {
             irradiance: sum / rays + hot,
             distance: rays / nearness,

@@ -3,22 +3,48 @@
 //! The inside of a lamp's shade, the ceiling a hand above a lamp: what they reflect beyond a cap is sent in closed
 //! form with shadow rays, as emitters send their light, and rays read no more than the cap.
 
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::emitter::AreaEmitter;
 use super::field::RadiosityField;
 use super::patches::Patches;
-use crate::element::Facet;
+use crate::element::{Facet, Side};
 use crate::light::luminance;
 
 /// What reflects this many times as much as the scene's mean is hot.
 const HOT: f64 = 16.0;
 
-/// A spot's brightest place reflects no more than this many times as much as its darkest: it is sent as even.
+/// A spot's brightest place reflects no more than this many times as much as its darkest: from afar it is even.
 const EVEN: f64 = 2.0;
 
 /// No more spots than this, the strongest.
 const MOST_SPOTS: usize = 128;
+
+/// A spot, as it shines.
+pub struct HotSpot {
+    /// What the field does not hold of it, as if it were even.
+    pub emitter: AreaEmitter,
+    /// Index of its facet, the facet's surface and side.
+    facet: (usize, usize, Side),
+    /// The element, plane coordinates of the facet.
+    min: DVec2,
+    max: DVec2,
+}
+
+impl HotSpot {
+    /// The exitance with which it shines at a place: from close by only a part of it is seen.
+    #[must_use]
+    pub fn exitance_at(&self, place: DVec3, field: &RadiosityField) -> DVec3 {
+        let frame = &self.emitter.frame();
+        let nearest = frame.project(place).clamp(self.min, self.max);
+        let distance = place.distance(frame.lift(nearest)) / (self.max - self.min).max_element();
+        if distance >= 1.0 {
+            return self.emitter.exitance();
+        }
+        field.excess_at(self.facet, nearest).lerp(self.emitter.exitance(), distance)
+    }
+}
 
 /// The spots of a scene.
 #[derive(Clone, Debug)]
@@ -60,20 +86,17 @@ impl HotSpots {
         is_hot
     }
 
-    /// What `field` does not hold of them, as emitters.
+    /// What `field` does not hold of them.
     #[must_use]
-    pub fn emitters(&self, field: &RadiosityField, facets: &[Facet]) -> Vec<AreaEmitter> {
-        let emitter = |&(index, element): &(usize, u32)| {
+    pub fn shining(&self, field: &RadiosityField, facets: &[Facet]) -> Vec<HotSpot> {
+        let spot = |&(index, element): &(usize, u32)| {
             let facet = &facets[index];
-            let area = facet.elements[element as usize].area;
-            AreaEmitter::new(
-                facet.frame,
-                facet.parts(element),
-                area,
-                field.mean_excess(index, facet, element),
-            )
+            let e = &facet.elements[element as usize];
+            let mean = field.mean_excess(index, facet, element);
+            let emitter = AreaEmitter::new(facet.frame, facet.parts(element), e.area, mean);
+            HotSpot { emitter, facet: (index, facet.surface, facet.side), min: e.min, max: e.max }
         };
-        self.elements.iter().map(emitter).collect()
+        self.elements.iter().map(spot).collect()
     }
 }
 

@@ -193,7 +193,7 @@ fn gather_reflected(
     let texels = area / texel.powi(2);
     let gather_from = |receivers: &[Vec<Receiver>], round: (Round, f64), facets: &mut [Facet]| {
         let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
-        let hot_spots = hot.emitters(&field, facets);
+        let hot_spots = hot.shining(&field, facets);
         let source = Source { field: &field, hot_spots: &hot_spots, directions: &directions };
         let (own, unsettled) = gather(pass, source, receivers, round, facets);
         tracing::debug!(?round, places = own.places, rays = own.rays, "gathered");
@@ -207,13 +207,13 @@ fn gather_reflected(
         if !std::mem::replace(&mut gaps_are_dark, true) {
             // What patches say of narrow gaps may be off by any amount. Light comes in from outside.
             darken(&gaps, facets);
-            for _ in 0..MOST_SWEEPS {
-                let (own, left) = gather_from(&gaps, (Round::IN_GAPS, UNSETTLED), facets);
-                counts.add(&own);
-                gaps = left;
-                if gaps.iter().all(Vec::is_empty) {
-                    break;
-                }
+        }
+        for _ in 0..MOST_SWEEPS {
+            let (own, left) = gather_from(&gaps, (Round::in_gaps(round), UNSETTLED), facets);
+            counts.add(&own);
+            gaps = left;
+            if gaps.iter().all(Vec::is_empty) {
+                break;
             }
         }
         patches.settle(&before, round.tolerance, facets);

@@ -134,22 +134,22 @@ pub(super) fn grid_points(parts: &[Vec<DVec3>], grid: RayGrid) -> Vec<(DVec3, f6
 }
 
 /// The irradiance that all `emitters` give to `receiver`, visibility counted by a few rays each; without those that
-/// would give no more than `negligible` with nothing between.
+/// would give no more than `negligible` with nothing between. Each shines with the exitance given beside it.
 #[must_use]
-pub fn irradiance_by_rays(
-    emitters: &[AreaEmitter],
+pub fn irradiance_by_rays<'t, E: FnOnce() -> DVec3>(
+    emitters: impl Iterator<Item = (&'t AreaEmitter, E)>,
     receiver: SurfacePoint,
     tracer: &Tracer,
     negligible: f64,
     e: &mut Evaluation,
 ) -> DVec3 {
     e.rays.clear();
-    for emitter in emitters {
+    for (emitter, exitance) in emitters {
         let grid = e.precision.rays;
         let told = emitter.told_by_points(receiver, grid);
         let form_factor = if emitter.is_far(receiver.position) { told } else { emitter.unoccluded(receiver) };
         if told > 0.0 && emitter.exitance.max_element() * form_factor > negligible {
-            let arriving = emitter.exitance * (form_factor / told);
+            let arriving = exitance() * (form_factor / told);
             emitter.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, arriving * part)));
         }
     }
