@@ -334,7 +334,10 @@ fn chart_texels(
         (ways, effort) = lighting.direct(Edges::Fitted).shine(&input.surfaces[surface], chart, &mut texels);
     }
     lighting.add_indirect(surface, &mut texels);
-    fit_reflected(lighting, chart, &cover, &mut texels);
+    // Where direct light is the mesh's too, lookups have both, and the dark that one makes beside a shadow stays.
+    if input.options.direct == Direct::Texel {
+        fit_reflected(lighting, chart, &cover, &mut texels);
+    }
     take_after_neighbours(&mut texels, |t| &mut t.indirect);
     for texel in &mut texels {
         texel.direct += texel.indirect;
