@@ -191,7 +191,7 @@ pub struct BakeOptions {
     /// Reflectances are clamped to this, `[0, 1)`: nothing may reflect all light for ever. Default: 0.95.
     pub max_reflectance: f64,
     /// Free texels around the texels that bilinear lookups inside a chart touch, `[1, 16]`; twice as
-    /// many lie between two charts. Default: 1, or 0 where the charts do not fit otherwise.
+    /// many lie between two charts. Default: one between two charts, or none where they do not fit otherwise.
     pub padding: Option<u32>,
     /// Mip levels, `[0, 4]`, that show each chart without its neighbours' light: charts lie in cells of whole texels
     /// of the coarsest level, and gutters are as wide as one of these. Costs room, the more the smaller

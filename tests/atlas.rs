@@ -158,7 +158,7 @@ fn assert_sound(surfaces: &[Surface], atlas: &Atlas) {
         let got = if m.x_axis.x == 0.0 { DVec2::new(texels.y, texels.x) } else { texels };
         assert!((got - wanted.max(DVec2::ONE)).abs().max_element() <= 0.5 + ROUNDING, "{got} for {wanted}");
     }
-    let gap = 2 * i64::from(atlas.padding);
+    let gap = i64::from(atlas.gutter);
     for (&(x, y), surface) in &owner {
         assert!(x < i64::from(atlas.width) && y < i64::from(atlas.height));
         for dy in -gap..=gap {
@@ -175,7 +175,7 @@ fn charts_keep_apart_on_a_page_of_given_size() {
     for (seed, side) in [(1, 64), (2, 128), (3, 200), (4, 256)] {
         let surfaces = furniture(48, seed);
         let atlas = unwrap(&surfaces, &at_size(side)).unwrap();
-        assert_eq!(atlas.padding, 1);
+        assert_eq!(atlas.gutter, 1);
         assert!(atlas.width.min(atlas.height) > side * 7 / 8 && atlas.width.max(atlas.height) <= side);
         assert_sound(&surfaces, &atlas);
     }
@@ -189,7 +189,7 @@ fn charts_keep_apart_at_a_given_density() {
             UnwrapOptions { padding: Some(padding), ..UnwrapOptions::new(Room::Density(texels_per_metre)) };
         let atlas = unwrap(&surfaces, &options).unwrap();
         assert_eq!((atlas.width % 4, atlas.height % 4), (0, 0));
-        assert_eq!((atlas.texels_per_metre, atlas.padding), (texels_per_metre, padding));
+        assert_eq!((atlas.texels_per_metre, atlas.gutter), (texels_per_metre, 2 * padding));
         assert_sound(&surfaces, &atlas);
     }
 }
@@ -210,7 +210,7 @@ fn pages_are_cropped_to_their_charts() {
     assert_eq!((long, short), (256, 88), "85 and one texels, in fours");
 }
 
-/// Where only the density is given the page takes any shape, and hardly more texels than the charts with padding.
+/// Where only the density is given the page takes any shape, and hardly more texels than the charts and the gaps between them.
 #[test]
 fn the_least_page_is_small() {
     let mut r = Random(9);
@@ -224,7 +224,7 @@ fn the_least_page_is_small() {
     }
     // Fewer texels than one a chart there cannot be.
     let atlas = unwrap(&surfaces, &UnwrapOptions::new(Room::Texels(1.0))).unwrap();
-    assert!(atlas.width * atlas.height <= 80 * 80, "200 charts of 4 × 4 with their padding");
+    assert!(atlas.width * atlas.height <= 48 * 48, "200 charts of 3 × 3 with the gaps between them");
     assert_sound(&surfaces, &atlas);
 }
 
@@ -330,7 +330,7 @@ fn what_does_not_fit_is_refused() {
     let padded = UnwrapOptions { padding: Some(1), ..at_size(32) };
     assert_eq!(
         unwrap(&many, &padded).err(),
-        Some(UnwrapError::TooSmall { charts: 300, padding: 1, side: 32 })
+        Some(UnwrapError::TooSmall { charts: 300, gutter: 2, side: 32 })
     );
     let huge = UnwrapOptions::new(Room::Density(1e5));
     assert!(matches!(unwrap(&many, &huge), Err(UnwrapError::TooLarge { charts: 300, .. })));
@@ -370,12 +370,12 @@ fn several_pages_hold_what_one_does_not() {
     assert_eq!(split.count(), 0, "two of ten groups on each of five pages");
 }
 
-/// Without padding asked for, crowded charts give theirs up before they are refused.
+/// Without padding asked for, crowded charts give up the gaps between them before they are refused.
 #[test]
-fn crowded_charts_do_without_padding() {
+fn crowded_charts_do_without_gaps() {
     let many: Vec<_> = (0..200).map(|_| rectangle(1.0, 1.0)).collect();
     let atlas = unwrap(&many, &at_size(32)).unwrap();
-    assert_eq!(atlas.padding, 0);
+    assert_eq!(atlas.gutter, 0);
     assert_sound(&many, &atlas);
 }
 

@@ -103,7 +103,7 @@ fn budgets_hold_for_every_kind_of_output() {
     let radiosity = with(&|o| o.quantity = Quantity::Radiosity);
     assert_eq!(radiosity.report.lightmap.png_bytes, 0, "radiosity has no PNG that could take bytes");
     let mips = with(&|o| o.mips = 2);
-    assert_eq!((mips.atlas.width % 4, mips.atlas.height % 4, mips.atlas.padding), (0, 0, 2));
+    assert_eq!((mips.atlas.width % 4, mips.atlas.height % 4, mips.atlas.gutter), (0, 0, 4));
 }
 
 /// What cannot be done is refused with the least figure that can, which then works.
@@ -147,7 +147,7 @@ fn mip_levels_show_each_chart_alone() {
     options.mips = levels;
     let result = baked("cornell", &options);
     let (atlas, page) = (&result.atlas, &result.lightmap);
-    assert_eq!((atlas.width % 8, atlas.height % 8, atlas.padding), (0, 0, 4));
+    assert_eq!((atlas.width % 8, atlas.height % 8, atlas.gutter), (0, 0, 8));
     let sites = sites(&result.surfaces, atlas, &|_, _| true);
     assert!(sites.len() > 10_000);
     for level in 1..=levels {

@@ -120,7 +120,7 @@ pub(super) fn fill_texels(report: &mut Report, (surfaces, atlas): (&[Surface], &
     let all = atlas.pages.iter().map(PageArea::texels).sum::<u64>() as f64;
     report.lightmap.utilisation = texels.covered as f64 / all.max(1.0);
     report.lightmap.padding = texels.dilated as f64 / all.max(1.0);
-    report.lightmap.gutter = 2 * atlas.padding;
+    report.lightmap.gutter = atlas.gutter;
     report.lightmap.density = density(surfaces, atlas);
 }
 

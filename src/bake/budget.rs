@@ -14,7 +14,7 @@ use super::enter;
 use super::page::{Page, PageMaker};
 use super::written::Written;
 
-/// Bytes that a texel takes in the EXR, about, padding counted.
+/// Bytes that a texel takes in the EXR, about, gaps counted.
 const EXR_A_TEXEL: f64 = 2.7;
 
 /// Bytes that a texel takes in the PNG, about.
@@ -58,7 +58,7 @@ pub(super) fn within(maker: &PageMaker, budget: u64, recorder: &mut Recorder) ->
     let mut rays = 0;
     let mut best = search(maker, (budget, padding), &mut rays, recorder)?;
     if best.is_none() && padding.is_none() {
-        // Many small charts are mostly padding.
+        // Many small charts are mostly gaps.
         best = search(maker, (budget, Some(0)), &mut rays, recorder)?;
     }
     let mut page = match best {
@@ -92,7 +92,7 @@ fn search(
         let bytes = bytes_of(maker, &page, recorder)?;
         *rays += page.texels.effort.rays;
         // Charts that do not want the texels that there are for them will not want more.
-        let grown = |side: u32| f64::from(side + 2 * page.atlas.padding);
+        let grown = |side: u32| f64::from(side + page.atlas.gutter);
         let made = grown(page.atlas.width) * grown(page.atlas.height);
         let is_sated = made < POOR * texels;
         tracing::debug!(texels, made, bytes, budget, "budget");

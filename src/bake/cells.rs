@@ -57,8 +57,9 @@ pub(super) fn fill_cells(lightmap: &mut Lightmap, surfaces: &[Surface], atlas: &
 fn cell_of(sites: &[TexelSite], atlas: &Atlas, align: u32) -> Cell {
     let range = |at: &dyn Fn(&TexelSite) -> u32, all: u32| {
         let (first, last) = sites.iter().map(at).fold((u32::MAX, 0), |(a, b), k| (a.min(k), b.max(k)));
-        let start = first.saturating_sub(atlas.padding) / align * align;
-        (start, (last + 1 + atlas.padding).next_multiple_of(align).min(all))
+        let free = atlas.gutter / 2;
+        let start = first.saturating_sub(free) / align * align;
+        (start, (last + 1 + free).next_multiple_of(align).min(all))
     };
     Cell { x: range(&|s| s.x, atlas.width), y: range(&|s| s.y, atlas.height) }
 }

@@ -8,14 +8,14 @@ use crate::raster::{Lighting, Lightmap, Rasterized, TexelCounts, rasterize};
 use crate::report::Recorder;
 use crate::surface::Surface;
 use crate::unwrap::{
-    Atlas, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_padding, unwrap_groups, whole,
+    Atlas, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_gutter, unwrap_groups, whole,
 };
 
 use super::budget::{self, texels_for};
 use super::cells::fill_cells;
 use super::enter;
 
-/// The share of a page that charts and their padding fill.
+/// The share of a page that charts and the gaps between them fill.
 pub(super) const FILLED: f64 = 0.95;
 
 /// The share of a page's texels that charts cover, about, where light decides on density.
@@ -168,8 +168,8 @@ impl<'a> PageMaker<'a> {
             Room::Square(side) => f64::from(side) - 1.0,
             _ => LONGEST * texels.sqrt(),
         };
-        let padding = mean_padding(padding, self.options.mips);
-        DensityOptions { texels, longest, padding, uniform_texel: self.texel }
+        let gutter = mean_gutter(padding, self.options.mips);
+        DensityOptions { texels, longest, gutter, uniform_texel: self.texel }
     }
 }
 

@@ -109,7 +109,8 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_enum, help_heading = LIGHTMAP)]
     density: Option<DensityWord>,
 
-    /// Free texels around what a lookup in a chart touches, 1 to 16 [default: 1, or 0 where charts do not fit otherwise]
+    /// Free texels around what a lookup in a chart touches, 1 to 16; twice as many lie between two charts [default: one
+    /// between two charts, or none where they do not fit otherwise]
     #[arg(long, value_name = "TEXELS", help_heading = LIGHTMAP)]
     padding: Option<u32>,
 

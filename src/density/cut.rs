@@ -1,7 +1,7 @@
 //! Cutting surfaces into parts of one spacing each.
 //!
 //! A part costs its error (squared error times area) and a price for each texel that its chart takes with
-//! the padding. A part is cut in two where that makes it cheaper; whether it does is asked from the
+//! the gap beside it. A part is cut in two where that makes it cheaper; whether it does is asked from the
 //! finest cuts upward, since one cut may pay only together with the next.
 
 use glam::DVec2;
@@ -136,7 +136,7 @@ struct Leaf {
     min: DVec2,
     max: DVec2,
     spacing: DVec2,
-    /// That its chart takes, with padding.
+    /// That its chart takes, with the gap beside it.
     texels: f64,
     /// Error and price.
     cost: f64,
@@ -327,9 +327,9 @@ impl<'a> Cutter<'a> {
         Leaf { min, max, spacing: extent / DVec2::from(count), texels: self.chart_texels(count), cost }
     }
 
-    /// Texels that a chart takes with its padding.
+    /// Texels that a chart takes with the gap beside it.
     fn chart_texels(&self, [width, height]: [f64; 2]) -> f64 {
-        let around = f64::from(1 + 2 * self.options.padding);
+        let around = f64::from(1 + self.options.gutter);
         (width + around) * (height + around)
     }
 }

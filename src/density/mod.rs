@@ -21,12 +21,12 @@ use crate::unwrap::{Part, area_within};
 /// What is known before the light is looked at, or before surfaces are cut.
 #[derive(Clone, Copy, Debug)]
 pub struct DensityOptions {
-    /// How many texels all charts may take together with their padding.
+    /// How many texels all charts may take together with the gaps between them.
     pub texels: f64,
     /// The longest that a chart may be, texels.
     pub longest: f64,
-    /// Free texels around each chart's bilinear footprint.
-    pub padding: u32,
+    /// Free texels between two charts.
+    pub gutter: u32,
     /// A texel's side if all were alike, metres.
     pub uniform_texel: f64,
 }

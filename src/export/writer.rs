@@ -127,7 +127,7 @@ fn provenance(baked: &Baked) -> Value {
         "density": baked.options.density,
         "mips": baked.options.mips,
         "texelsPerMetre": baked.atlas.texels_per_metre,
-        "padding": baked.atlas.padding,
+        "gutter": baked.atlas.gutter,
     })
 }
 

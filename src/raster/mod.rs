@@ -1,7 +1,7 @@
 //! Stage 7: from charts and the radiosity mesh to texels.
 //!
 //! Every texel that a bilinear lookup inside a chart can touch is evaluated at a point of its
-//! own chart and outside of any solid that stands there; the rest of the padding is filled
+//! own chart and outside of any solid that stands there; the gaps between charts are filled
 //! from it.
 
 mod buried;
@@ -241,7 +241,7 @@ pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> Rasterized {
         .collect();
     let size = (atlas.width, atlas.height);
     let count = size.0 as usize * size.1 as usize;
-    let (mut texels, mut valid) = (vec![[0.0; 3]; count], vec![false; count]);
+    let (mut texels, mut owners) = (vec![[0.0; 3]; count], vec![None; count]);
     let mut counts = TexelCounts { covered: sites.len() as u64, ..TexelCounts::default() };
     for (lit, ways, effort) in &lit {
         if input.options.direct == Direct::Texel {
@@ -253,10 +253,11 @@ pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> Rasterized {
             let site = &sites[texel.site];
             let at = site.y as usize * size.0 as usize + site.x as usize;
             texels[at] = texel.direct.as_vec3().to_array();
-            valid[at] = true;
+            owners[at] = Some(site.chart);
         }
     }
-    counts.seams = seams::join(input.surfaces, atlas, &mut texels, &valid);
+    counts.seams = seams::join(input.surfaces, atlas, &mut texels, &owners);
+    let mut valid: Vec<bool> = owners.iter().map(Option::is_some).collect();
     let finished = sites.par_iter().map(|site| {
         let at = site.y as usize * size.0 as usize + site.x as usize;
         let irradiance = DVec3::from_array(texels[at].map(f64::from));
@@ -273,10 +274,11 @@ pub fn rasterize(lighting: &Lighting, atlas: &Atlas) -> Rasterized {
     }
     tracing::debug!(?counts, "texels");
     let before = valid.iter().filter(|&&v| v).count();
+    let half = atlas.gutter.div_ceil(2);
     if let Some(preview) = &mut preview {
-        dilate(preview, &mut valid.clone(), size, atlas.padding);
+        dilate(preview, &mut valid.clone(), size, half);
     }
-    dilate(&mut texels, &mut valid, size, atlas.padding);
+    dilate(&mut texels, &mut valid, size, half);
     counts.dilated = (valid.iter().filter(|&&v| v).count() - before) as u64;
     let page = |texels| Lightmap { width: size.0, height: size.1, texels };
     Rasterized { lightmap: page(texels), preview: preview.map(page), counts }

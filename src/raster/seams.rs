@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::light::luminance;
 use crate::surface::Surface;
-use crate::unwrap::{Atlas, Chart};
+use crate::unwrap::Atlas;
 
 /// Sample points for each texel of the finer side.
 const SAMPLES_A_TEXEL: f64 = 2.0;
@@ -50,8 +50,9 @@ pub struct SeamReport {
 }
 
 /// A line that two charts show, in the plane of each.
-struct Seam<'a> {
-    charts: [&'a Chart; 2],
+struct Seam {
+    /// Indices.
+    charts: [usize; 2],
     from: [DVec2; 2],
     to: [DVec2; 2],
 }
@@ -64,19 +65,19 @@ struct Tap {
     areas: [f64; 2],
 }
 
-/// Changes texels along seams. `valid` tells which texels belong to charts.
+/// Changes texels along seams. `owners` tells to which chart texels belong, by index.
 pub(super) fn join(
     surfaces: &[Surface],
     atlas: &Atlas,
     texels: &mut [[f32; 3]],
-    valid: &[bool],
+    owners: &[Option<u32>],
 ) -> SeamReport {
     let mut report = SeamReport::default();
     let mut taps = Vec::new();
     let mut light = 0.0;
     let value = |texels: &[[f32; 3]], t: u32| DVec3::from_array(texels[t as usize].map(f64::from));
     for seam in seams(surfaces, atlas) {
-        for tap in seam.taps(atlas, valid) {
+        for tap in seam.taps(atlas, owners) {
             report.samples += 1;
             let side = |range: std::ops::Range<usize>| -> DVec3 {
                 range.map(|k| value(texels, tap.texels[k]) * tap.weights[k].abs()).sum()
@@ -164,12 +165,14 @@ impl Fit {
     }
 }
 
-impl Seam<'_> {
-    /// Samples along the line, where all texels that lookups touch belong to charts.
-    fn taps(&self, atlas: &Atlas, valid: &[bool]) -> Vec<Tap> {
-        let ends = [0, 1].map(|k| [self.from[k], self.to[k]].map(|p| self.charts[k].texel(p)));
+impl Seam {
+    /// Samples along the line, where all texels that lookups touch are the chart's own: outlines reach beyond the
+    /// surface, and other charts may lie there.
+    fn taps(&self, atlas: &Atlas, owners: &[Option<u32>]) -> Vec<Tap> {
+        let charts = self.charts.map(|index| &atlas.charts[index]);
+        let ends = [0, 1].map(|k| [self.from[k], self.to[k]].map(|p| charts[k].texel(p)));
         let length = ends.iter().map(|[a, b]| a.distance(*b)).fold(0.0, f64::max);
-        let areas = self.charts.map(|c| 1.0 / c.texel_from_plane.matrix2.determinant().abs());
+        let areas = charts.map(|c| 1.0 / c.texel_from_plane.matrix2.determinant().abs());
         let least = areas[0].min(areas[1]);
         let areas = areas.map(|area| area / least);
         let count = (SAMPLES_A_TEXEL * length).ceil().clamp(1.0, 65536.0);
@@ -187,7 +190,8 @@ impl Seam<'_> {
                         return None;
                     }
                     let texel = y as usize * atlas.width as usize + x as usize;
-                    if !valid.get(texel).copied().unwrap_or(false) {
+                    let owner = owners.get(texel).copied().flatten();
+                    if owner.is_none_or(|chart| chart as usize != self.charts[side]) {
                         return None;
                     }
                     tap.texels[4 * side + k] = texel as u32;
@@ -201,13 +205,14 @@ impl Seam<'_> {
 }
 
 /// All lines that two charts show: cuts, and edges across which one surface goes on in another.
-fn seams<'a>(surfaces: &[Surface], atlas: &'a Atlas) -> Vec<Seam<'a>> {
+fn seams(surfaces: &[Surface], atlas: &Atlas) -> Vec<Seam> {
     let mut seams = Vec::new();
     for surface in 0..surfaces.len() {
-        let charts = atlas.charts_of(surface);
-        for (index, a) in charts.iter().enumerate() {
-            for b in &charts[index + 1..] {
-                seams.extend(common_edge(&a.outline, &b.outline).map(|[from, to]| Seam {
+        let indices = atlas.indices_of(surface);
+        for a in indices.clone() {
+            for b in a + 1..indices.end {
+                let outlines = [a, b].map(|chart| &atlas.charts[chart].outline);
+                seams.extend(common_edge(outlines[0], outlines[1]).map(|[from, to]| Seam {
                     charts: [a, b],
                     from: [from; 2],
                     to: [to; 2],
@@ -242,7 +247,7 @@ fn common_edge(a: &[DVec2], b: &[DVec2]) -> Option<[DVec2; 2]> {
 type SurfaceEdge = (usize, [DVec2; 2]);
 
 /// Edges that two surfaces in one plane share whole, where neither is cut.
-fn between_surfaces<'a>(surfaces: &[Surface], atlas: &'a Atlas) -> Vec<Seam<'a>> {
+fn between_surfaces(surfaces: &[Surface], atlas: &Atlas) -> Vec<Seam> {
     let corners = surfaces.iter().flat_map(|s| s.rings.iter().flatten().map(|&p| s.frame.lift(p)));
     let size = crate::geom::Bounds::of(corners.filter(|p| p.is_finite())).diagonal();
     if !(size > 0.0 && size.is_finite()) {
@@ -262,7 +267,7 @@ fn between_surfaces<'a>(surfaces: &[Surface], atlas: &'a Atlas) -> Vec<Seam<'a>>
     let joined = edges.into_values().filter_map(|sides| {
         let [(a, first), (b, second)] = sides[..] else { return None };
         let is_smooth = surfaces[a].frame.normal.dot(surfaces[b].frame.normal) > 1.0 - COPLANAR;
-        let charts = [atlas.charts_of(a).first()?, atlas.charts_of(b).first()?];
+        let charts = [atlas.indices_of(a).next()?, atlas.indices_of(b).next()?];
         (a != b && is_smooth).then_some(Seam {
             charts,
             from: [first[0], second[0]],
@@ -277,7 +282,7 @@ mod tests {
     use super::*;
     use glam::{DAffine2, DMat2};
 
-    use crate::unwrap::PageArea;
+    use crate::unwrap::{Chart, PageArea};
 
     /// Two charts of the unit square, cut at x = ½: one of 4 × 8 texels, one of 2 × 2.
     fn atlas() -> Atlas {
@@ -296,19 +301,23 @@ mod tests {
             chart(DVec2::new(0.5, 0.0), DVec2::ONE, DVec2::new(2.0, 2.0), DVec2::new(8.0, 1.0)),
         ];
         let pages = vec![PageArea { row: 0, width: 16, height: 16 }];
-        Atlas { width: 16, height: 16, pages, texels_per_metre: 8.0, padding: 1, charts }
+        Atlas { width: 16, height: 16, pages, texels_per_metre: 8.0, gutter: 2, charts }
     }
 
-    fn joined(light: impl Fn(DVec2) -> f64) -> (Atlas, Vec<[f32; 3]>, Vec<[f32; 3]>, SeamReport) {
+    /// The light in texels that belong to the charts `owned`, joined.
+    fn joined(
+        light: impl Fn(DVec2) -> f64,
+        owned: [u32; 2],
+    ) -> (Atlas, Vec<[f32; 3]>, Vec<[f32; 3]>, SeamReport) {
         let atlas = atlas();
-        let (mut texels, mut valid) = (vec![[0.0_f32; 3]; 256], vec![false; 256]);
-        for (chart, count) in atlas.charts.iter().zip([[4, 8], [2, 2]]) {
+        let (mut texels, mut owners) = (vec![[0.0_f32; 3]; 256], vec![None; 256]);
+        for ((chart, count), own) in atlas.charts.iter().zip([[4, 8], [2, 2]]).zip(owned) {
             let low = chart.texel(chart.outline[0]) - 0.5;
             for (x, y) in (0..=count[1]).flat_map(|y| (0..=count[0]).map(move |x| (x, y))) {
                 let at = low + DVec2::new(f64::from(x), f64::from(y));
                 let p = chart.texel_from_plane.inverse().transform_point2(at + 0.5);
                 let index = at.y as usize * 16 + at.x as usize;
-                (texels[index], valid[index]) = ([light(p) as f32; 3], true);
+                (texels[index], owners[index]) = ([light(p) as f32; 3], Some(own));
             }
         }
         let before = texels.clone();
@@ -322,13 +331,13 @@ mod tests {
             area: 1.0,
             double_sided: false,
         };
-        let report = join(&[surface], &atlas, &mut texels, &valid);
+        let report = join(&[surface], &atlas, &mut texels, &owners);
         (atlas, before, texels, report)
     }
 
     #[test]
     fn a_bend_that_one_side_cannot_show_is_agreed_upon() {
-        let (_, before, after, report) = joined(|p| 1.0 + 0.1 * (6.0 * p.y).sin());
+        let (_, before, after, report) = joined(|p| 1.0 + 0.1 * (6.0 * p.y).sin(), [0, 1]);
         assert!(report.samples >= 16 && report.apart == 0, "{report:?}");
         assert!(report.before > 0.02 && report.after < 0.2 * report.before, "{report:?}");
         let most = before.iter().zip(&after).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
@@ -337,10 +346,17 @@ mod tests {
 
     #[test]
     fn what_agrees_is_left_alone_and_so_are_edges_of_shadows() {
-        let (_, before, after, report) = joined(|p| 1.0 + p.x + p.y);
+        let (_, before, after, report) = joined(|p| 1.0 + p.x + p.y, [0, 1]);
         assert!(report.before < 1e-6, "{report:?}");
         assert!(before.iter().zip(&after).all(|(a, b)| (a[0] - b[0]).abs() < 1e-5));
-        let (.., report) = joined(|p| if p.y > 0.3 { 1.0 } else { 0.01 });
+        let (.., report) = joined(|p| if p.y > 0.3 { 1.0 } else { 0.01 }, [0, 1]);
         assert!(report.apart > 0, "{report:?}");
+    }
+
+    /// An outline reaches beyond its surface, and texels of another chart may lie there.
+    #[test]
+    fn other_charts_texels_are_left_alone() {
+        let (_, before, after, report) = joined(|p| 1.0 + 0.1 * (6.0 * p.y).sin(), [0, 7]);
+        assert_eq!((report.samples, before == after), (0, true));
     }
 }

@@ -6,13 +6,13 @@
 pub enum UnwrapError {
     /// The charts with their padding do not fit.
     #[error(
-        "{charts} charts with {padding} texels of padding do not fit into {side} × {side} texels; ask for a larger --size, more --pages, a smaller --padding or fewer --mips"
+        "{charts} charts with {gutter} texels between them do not fit into {side} × {side} texels; ask for a larger --size, more --pages, a smaller --padding or fewer --mips"
     )]
     TooSmall {
         /// How many charts there are.
         charts: usize,
         /// Padding asked for.
-        padding: u32,
+        gutter: u32,
         /// The page's side.
         side: u32,
     },

@@ -27,7 +27,7 @@ impl Layout {
             height: page.height,
             pages: vec![PageArea { row: 0, width: page.width, height: page.height }],
             texels_per_metre: self.texels_per_metre * if mean_weight.is_finite() { mean_weight } else { 1.0 },
-            padding: page.gutter.padding,
+            gutter: page.gutter.gap,
             charts: sized.iter().zip(&self.places).map(|(chart, &place)| chart.chart(place)).collect(),
         })
     }
@@ -59,21 +59,21 @@ pub(super) fn sized(shapes: &[Shape], texels_per_metre: f64) -> Option<Vec<Sized
     shapes.iter().map(|s| SizedShape::new(s, texels_per_metre)).collect()
 }
 
-/// Whether every footprint lies in the page, and none meets another when each is grown by the padding.
+/// Whether every footprint lies in the page, and each is the gap from all others.
 pub(super) fn keeps_apart(charts: &[SizedShape<'_>], places: &[Place], page: Page) -> bool {
-    let Gutter { padding, .. } = page.gutter;
-    let grown = |texels: u32| texels as usize + 2 * padding as usize;
+    let Gutter { gap, .. } = page.gutter;
+    let grown = |texels: u32| texels as usize + gap as usize;
     let mut taken = BitGrid::new(grown(page.width), grown(page.height));
     charts.iter().zip(places).all(|(sized, &place)| {
-        let local = sized.chart(Place { x: padding, y: padding, ..place });
+        let local = sized.chart(Place { x: 0, y: 0, ..place });
         let (width, height) = sized.turned(place.turn);
         let inside = place.x + width < page.width && place.y + height < page.height;
         let mut own = BitGrid::new(grown(width + 1), grown(height + 1));
-        let (bound, padding) = (grown(height + 1) as i64, i64::from(padding));
+        let (bound, gap) = (grown(height + 1) as i64, i64::from(gap));
         for triangle in &sized.shape.triangles {
             for span in footprint::spans(triangle.map(|p| local.texel(p)), 1.0, (0, bound)) {
-                for y in span.y - padding..=span.y + padding {
-                    own.set_span(y, span.first - padding, span.last + padding);
+                for y in span.y..=span.y + gap {
+                    own.set_span(y, span.first, span.last + gap);
                 }
             }
         }
@@ -81,7 +81,7 @@ pub(super) fn keeps_apart(charts: &[SizedShape<'_>], places: &[Place], page: Pag
     })
 }
 
-/// The density at which all charts take about `texels` with their padding, none above `most`;
+/// The density at which all charts take about `texels` with their gaps, none above `most`;
 /// 0 where charts of one texel take more.
 pub(super) fn density_of_texels(shapes: &[Shape], texels: f64, gutter: Gutter, most: f64) -> f64 {
     let page = Page { width: pack::LARGEST_SIDE, height: pack::LARGEST_SIDE, gutter };

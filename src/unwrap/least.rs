@@ -67,7 +67,7 @@ fn cost(page: Page) -> u64 {
 fn strips(charts: &[SizedShape<'_>], gutter: Gutter, longest: u32) -> Vec<Page> {
     let page = Page { width: longest, height: longest, gutter };
     let square = charts.iter().map(|c| page.cell_area(c)).sum::<f64>().sqrt();
-    let footprint = |side: u32| gutter.cell(side) - 2 * gutter.overhang();
+    let footprint = |side: u32| gutter.cell(side) - gutter.overhang();
     let thickest = charts.iter().map(|c| footprint(c.width.min(c.height))).max().unwrap_or(1);
     let longest_chart = charts.iter().map(|c| footprint(c.width.max(c.height))).max().unwrap_or(1);
     let is_tried = |factor: &f64| *factor <= WIDE.0 || factor * square <= WIDE.1;

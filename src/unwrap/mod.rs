@@ -30,6 +30,8 @@ pub use error::UnwrapError;
 pub use part::{Part, whole};
 pub(crate) use part::{area_within, clip};
 
+use std::ops::Range;
+
 use glam::{DAffine2, DVec2};
 
 use crate::geom::Ring;
@@ -54,9 +56,8 @@ pub struct Atlas {
     pub pages: Vec<PageArea>,
     /// Texels per metre of surface, before what rounding charts to whole texels changed.
     pub texels_per_metre: f64,
-    /// Free texels kept around what bilinear lookups of a chart touch, so that twice as many lie
-    /// between two charts; none at the page's edge.
-    pub padding: u32,
+    /// Free texels kept between what bilinear lookups of two charts touch; none at the page's edge.
+    pub gutter: u32,
     /// Surface by surface, at least one for each.
     pub charts: Vec<Chart>,
 }
@@ -65,9 +66,14 @@ impl Atlas {
     /// The charts of a surface: together they cover it, and no two share more than a cut.
     #[must_use]
     pub fn charts_of(&self, surface: usize) -> &[Chart] {
+        &self.charts[self.indices_of(surface)]
+    }
+
+    /// The indices of [`Self::charts_of`].
+    #[must_use]
+    pub fn indices_of(&self, surface: usize) -> Range<usize> {
         let first = self.charts.partition_point(|c| c.surface < surface);
-        let end = first + self.charts[first..].partition_point(|c| c.surface == surface);
-        &self.charts[first..end]
+        first..first + self.charts[first..].partition_point(|c| c.surface == surface)
     }
 
     /// The chart that holds point `p` of a surface (plane coordinates, metres), or the nearest one; `None` for a
@@ -134,7 +140,7 @@ pub enum Room {
     Square(u32),
     /// This many texels a metre; the page is as small as the packers reach.
     Density(f64),
-    /// About this many texels in all, with padding; the page is as small as the packers reach.
+    /// About this many texels in all, with gaps; the page is as small as the packers reach.
     Texels(f64),
 }
 
@@ -145,13 +151,13 @@ pub struct UnwrapOptions {
     pub room: Room,
     /// Charts are not denser than this, texels a metre, where more would fit. Default: no limit.
     pub most: Option<f64>,
-    /// Free texels around each chart's bilinear footprint. Default: 1, which leaves two between
-    /// charts, enough for bilinear filtering with a graphics card's fixed-point weights; 0 where
+    /// Free texels around each chart's bilinear footprint, twice as many between two. Default: one texel between two
+    /// charts, which no lookup inside either touches, also with a graphics card's fixed-point weights; none where
     /// the charts do not fit otherwise.
     pub padding: Option<u32>,
     /// Mip levels, at most [`MOST_MIPS`], in which bilinear lookups inside a chart touch no other chart's texels:
-    /// each chart's cell begins and ends at multiples of `2^mips`, with at least half as much padding
-    /// inside. Costs room. Default: 0, for lookups in the page itself only.
+    /// each chart's cell begins and ends at multiples of `2^mips`, with at least half as much
+    /// free inside. Costs room. Default: 0, for lookups in the page itself only.
     pub mips: u32,
     /// The most pages, at least 1: [`Room::Square`] is for each, and as many are filled as charts want;
     /// otherwise there are several where one of 16384 texels a side does not do. Default: 1.
@@ -216,18 +222,18 @@ pub fn check_side(charts: usize, (side, pages): (u32, u32), padding: Option<u32>
     if charts as u64 <= fit {
         return Ok(());
     }
-    Err(UnwrapError::TooSmall { charts, padding: padding.unwrap_or(0), side })
+    Err(UnwrapError::TooSmall { charts, gutter: 2 * padding.unwrap_or(0), side })
 }
 
 fn gutter(padding: Option<u32>, mips: u32) -> Gutter {
-    Gutter::new(padding.unwrap_or(1), mips)
+    Gutter::new(padding.map_or(1, |p| 2 * p.min(LARGEST_SIDE)), mips)
 }
 
-/// The texels around a chart's footprint that its cell takes on each side, on average.
+/// The columns, and the rows, that a chart's cell takes beside its footprint, on average.
 #[must_use]
-pub fn mean_padding(padding: Option<u32>, mips: u32) -> u32 {
-    let Gutter { padding, align } = gutter(padding, mips);
-    padding + align / 4
+pub fn mean_gutter(padding: Option<u32>, mips: u32) -> u32 {
+    let Gutter { gap, align } = gutter(padding, mips);
+    gap + align / 2
 }
 
 /// Lays `shapes` out with that much between them.
@@ -239,7 +245,7 @@ fn lay_out(shapes: &[Shape], options: &UnwrapOptions, gutter: Gutter) -> Result<
             // Levels of a page whose sides are no multiples of the cells' would not keep to the cells.
             let side = side.min(LARGEST_SIDE) / gutter.align * gutter.align;
             let page = Page { width: side, height: side, gutter };
-            let too_small = UnwrapError::TooSmall { charts, padding: gutter.padding, side };
+            let too_small = UnwrapError::TooSmall { charts, gutter: gutter.gap, side };
             let layout = fill(shapes, page, most).ok_or(too_small.clone())?;
             if layout.texels_per_metre < most {
                 return layout.atlas(shapes, page).ok_or(too_small);

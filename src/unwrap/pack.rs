@@ -14,22 +14,23 @@ pub(super) const STEP: u32 = 4;
 /// How far apart charts stay, and where they may begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Gutter {
-    /// Free texels around each footprint.
-    pub(super) padding: u32,
-    /// Charts' cells (footprint and padding) begin and end at multiples of this, a power of two, so that a
-    /// texel of a mip map shows one chart only. Where it is 1, padding may hang over the page's edge.
+    /// Free texels between two footprints, at least.
+    pub(super) gap: u32,
+    /// Charts' cells (footprint and gap) begin and end at multiples of this, a power of two, so that a
+    /// texel of a mip map shows one chart only. Where it is 1, gaps may hang over the page's far edges.
     pub(super) align: u32,
 }
 
 impl Gutter {
-    /// For so many mip levels, with at least `padding`.
+    /// For so many mip levels, with at least `gap`.
     ///
     /// A lookup in level `n` touches texels of `b = 2ⁿ` whose centres are less than `b` away. With the footprint
     /// at least `b / 2` inside a cell of whole such texels these are the cell's own, and they are in the
     /// finer levels then.
-    pub(super) fn new(padding: u32, mips: u32) -> Self {
+    pub(super) fn new(gap: u32, mips: u32) -> Self {
         let align = 1 << mips.min(super::MOST_MIPS);
-        Self { padding: padding.max(align / 2).min(LARGEST_SIDE), align }
+        let gap = gap.min(LARGEST_SIDE);
+        Self { gap: if align == 1 { gap } else { gap.max(align).next_multiple_of(2) }, align }
     }
 
     /// Sides that are not given are multiples of this.
@@ -39,12 +40,17 @@ impl Gutter {
 
     /// Texels that a cell takes along a side on which its chart has `texels` from the first centre to the last.
     pub(super) fn cell(self, texels: u32) -> u32 {
-        (texels + 1 + 2 * self.padding).next_multiple_of(self.align)
+        (texels + 1 + self.gap).next_multiple_of(self.align)
     }
 
-    /// The texels by which cells may hang over the page's edge on either side.
+    /// The texels by which cells may hang over the page's far edges.
     pub(super) fn overhang(self) -> u32 {
-        if self.align == 1 { self.padding } else { 0 }
+        if self.align == 1 { self.gap } else { 0 }
+    }
+
+    /// Texels from a cell's beginning to its footprint.
+    fn inset(self) -> u32 {
+        if self.align == 1 { 0 } else { self.gap / 2 }
     }
 }
 
@@ -62,11 +68,11 @@ pub(super) struct Page {
 impl Page {
     /// Columns and rows that there are for cells.
     pub(super) fn grown(&self) -> (u32, u32) {
-        let over = 2 * self.gutter.overhang();
+        let over = self.gutter.overhang();
         (self.width + over, self.height + over)
     }
 
-    /// The columns and rows that a chart takes with its padding.
+    /// The columns and rows that a chart takes with the gap beside it.
     pub(super) fn cell(&self, chart: &SizedShape<'_>) -> (u32, u32) {
         (self.gutter.cell(chart.width), self.gutter.cell(chart.height))
     }
@@ -79,20 +85,17 @@ impl Page {
 
     /// The place of a chart whose cell begins at that column and row of those that there are for cells.
     pub(super) fn place(&self, (x, y): (u32, u32), turn: Turn) -> Place {
-        // The footprint begins `padding` inside the cell, the page `overhang` inside what is there for cells.
-        let inset = self.gutter.padding - self.gutter.overhang();
+        let inset = self.gutter.inset();
         Place { x: x + inset, y: y + inset, turn }
     }
 
     /// The page without the columns and rows at its end that no chart reaches.
     pub(super) fn cropped(&self, charts: &[SizedShape<'_>], places: &[Place]) -> Self {
-        let Gutter { padding, .. } = self.gutter;
         let (mut width, mut height) = (1, 1);
         for (chart, place) in charts.iter().zip(places) {
             let (w, h) = chart.turned(place.turn);
             let end = |at: u32, texels: u32| {
-                // The cell without what hangs over on both sides, from the page's edge on.
-                at + self.gutter.cell(texels) - padding - self.gutter.overhang()
+                at + self.gutter.cell(texels) - self.gutter.inset() - self.gutter.overhang()
             };
             (width, height) = (width.max(end(place.x, w)), height.max(end(place.y, h)));
         }
@@ -136,8 +139,7 @@ pub(super) enum Turn {
 pub(super) trait Packer {
     /// One place per chart, in order, or nothing if they do not fit.
     ///
-    /// The footprints, each grown by the padding, do not overlap, and lie in the page before they
-    /// are grown. The same input gives the same places.
+    /// The footprints lie in the page, two of them at least the gap apart. The same input gives the same places.
     fn pack(&self, charts: &[SizedShape<'_>], page: Page) -> Option<Vec<Place>>;
 }
 

@@ -9,7 +9,7 @@ use super::pack::{Gutter, LARGEST_SIDE, Page};
 use super::shape::Shape;
 use super::{Atlas, PageArea, Room, UnwrapError, UnwrapOptions, fill, lay_out};
 
-/// The share of a page that charts with their padding fill, about.
+/// The share of a page that charts with their gaps fill, about.
 const FILLED: f64 = 0.95;
 
 /// Groups stay whole where no page then gets more than this many times its share of the charts.
@@ -52,7 +52,7 @@ fn pages_needed(shapes: &[Shape], options: &UnwrapOptions, gutter: Gutter, most:
     if pages.is_finite() { (pages as u32).clamp(1, most) } else { most }
 }
 
-/// What each shape takes with its padding, texels; infinite where it is too long for any page.
+/// What each shape takes with its gap, texels; infinite where it is too long for any page.
 fn cell_areas(shapes: &[Shape], density: f64, gutter: Gutter) -> Vec<f64> {
     let page = Page { width: LARGEST_SIDE, height: LARGEST_SIDE, gutter };
     let area = |shape: &Shape| {
@@ -130,7 +130,7 @@ fn on_pages(
         Room::Square(side) => {
             let side = side.min(LARGEST_SIDE) / gutter.align * gutter.align;
             let page = Page { width: side, height: side, gutter };
-            let too_small = || UnwrapError::TooSmall { charts: shapes.len(), padding: gutter.padding, side };
+            let too_small = || UnwrapError::TooSmall { charts: shapes.len(), gutter: gutter.gap, side };
             let fill = |own: &Vec<Shape>, most: f64| fill(own, page, most).ok_or_else(too_small);
             let layouts: Vec<_> = own.iter().map(|own| fill(own, limit)).collect::<Result<_, _>>()?;
             let least = layouts.iter().map(|l| l.texels_per_metre).fold(limit, f64::min);
@@ -150,14 +150,14 @@ fn on_pages(
     Ok(sheet(atlases?, (shapes, division), gutter))
 }
 
-/// Puts pages one below another, so far apart that no chart's padding reaches the next page.
+/// Puts pages one below another, so far apart that no chart's gap reaches the next page.
 fn sheet(atlases: Vec<Atlas>, (shapes, division): (&[Shape], &[Vec<usize>]), gutter: Gutter) -> Atlas {
-    let gap = (2 * gutter.padding).next_multiple_of(gutter.align);
+    let gap = gutter.gap.next_multiple_of(gutter.align);
     let mut sheet = Atlas {
         width: 0,
         height: 0,
         texels_per_metre: 0.0,
-        padding: gutter.padding,
+        gutter: gutter.gap,
         pages: vec![],
         charts: vec![],
     };

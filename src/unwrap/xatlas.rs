@@ -97,7 +97,8 @@ impl Packer for Nesting {
         xatlas.add_uv_mesh(&decl).ok()?;
         xatlas.compute_charts(&ChartOptions::default());
         xatlas.pack_charts(&PackOptions {
-            padding: page.gutter.padding,
+            // On either side.
+            padding: page.gutter.gap.div_ceil(2),
             texels_per_unit: 1.0,
             resolution: page.width,
             bilinear: true,

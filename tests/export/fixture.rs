@@ -208,7 +208,7 @@ impl Results {
             height: side,
             pages,
             texels_per_metre: 8.0,
-            padding: 1,
+            gutter: 2,
             charts: charts.collect(),
         };
         let texel = |i: u32| [(i % side) as f32 / 16.0, (i / side) as f32 / 64.0, 0.5];
