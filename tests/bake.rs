@@ -310,7 +310,9 @@ fn bake_under_a_card(material: &Value, extras: &Value, side: u32) -> BakeResult 
         json!({"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 10}]}}),
     );
     let mut options = sized(side);
+    // What the outermost texels reach of the light depends on how texels lie.
     options.density = cobake::options::DensityPolicy::Uniform;
+    options.padding = Some(1);
     draft.set("/nodes/1/extras", json!({"cobake": extras}));
     bake_scene(&draft.scene(), &options, &mut Silent).expect("baked")
 }

@@ -80,8 +80,8 @@ fn budgets_hold_and_are_used() {
             last = texels;
             errors.push(error(name, &result.glb));
         }
-        // What the solver leaves does not get less with more texels.
-        assert!(errors.windows(2).all(|e| e[1] < 1.1 * e[0]), "{name}: {errors:?}");
+        // What the solver leaves does not get less with more texels, and single points decide on much of the rest.
+        assert!(errors.windows(2).all(|e| e[1] < 1.25 * e[0]), "{name}: {errors:?}");
         assert!(errors[4] < 0.7 * errors[0], "{name}: {errors:?}");
     }
 }

@@ -137,7 +137,7 @@ fn every_triangle_finds_its_light_on_its_own_page() {
 /// places for meshes.
 #[test]
 fn nodes_stay_what_they_were() {
-    let result = baked("cornell", &options(64, 3));
+    let result = baked("cornell", &options(48, 4));
     let before = std::fs::read(fixture("cornell")).expect("read");
     let before = reread(&before).source.json;
     let after = reread(&result.glb).source.json;

@@ -142,11 +142,13 @@ impl Model {
     }
 }
 
-/// Options for a page of `side` texels, all of a size, so that distances can be told in texels.
+/// Options for a page of `side` texels, all of a size, so that distances can be told in texels. The padding is given
+/// since what texels miss of a sharp edge depends on where it falls between them.
 pub(crate) fn sized(side: u32) -> BakeOptions {
     let mut options = BakeOptions::default();
     options.resolution = Resolution::Size(side);
     options.density = DensityPolicy::Uniform;
+    options.padding = Some(1);
     options
 }
 
