@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::layout;
 use super::map::{LEAST_STRETCH, mean_density, stretch};
-use super::overlap::overlap;
+use super::overlap::{Overlap, overlap};
 use crate::geom::triangle::area_normal;
 use crate::scene::{Placement, Scene};
 
@@ -13,6 +13,10 @@ const OUTSIDE: f64 = 1e-4;
 
 /// Triangles without area in the layout may have this share of the node's area in the scene: slivers.
 const NO_AREA: f64 = 1e-3;
+
+/// Triangles may share this fraction of a layout's area: where an automatic unwrapping folds over itself by less than a
+/// texel.
+const MOST_SHARED: f64 = 0.01;
 
 /// Why a node's layout cannot be kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,11 +41,8 @@ pub(super) enum Fault {
         /// of all that the node has.
         all: usize,
     },
-    /// Triangles share room in it.
-    Overlap {
-        /// Two of them, counted through the node's primitives.
-        triangles: [usize; 2],
-    },
+    /// Triangles share room in it: not kept beyond [`MOST_SHARED`].
+    Overlap(Overlap),
 }
 
 impl Fault {
@@ -54,26 +55,38 @@ impl Fault {
                 format!(" (from {:.3}, {:.3} to {:.3}, {:.3})", low.x, low.y, high.x, high.y)
             }
             Self::NoArea { count, all } => format!(" ({count} of {all} triangles)"),
-            Self::Overlap { triangles: [a, b] } => format!(" (such as triangles {a} and {b})"),
+            Self::Overlap(Overlap { share, triangles: [a, b] }) if !self.is_fatal() => {
+                format!(" ({:.2} % of its area, such as triangles {a} and {b})", 100.0 * share)
+            }
+            Self::Overlap(Overlap { triangles: [a, b], .. }) => format!(" (such as triangles {a} and {b})"),
         }
+    }
+
+    /// Whether the layout cannot be kept for it.
+    pub(super) fn is_fatal(self) -> bool {
+        !matches!(self, Self::Overlap(Overlap { share, .. }) if share <= MOST_SHARED)
     }
 
     /// The reason and what happens instead, the same words for all nodes.
     pub(super) fn text(self) -> String {
         let reason = match self {
-            Self::Missing => "there is no TEXCOORD_1 to keep: the lightmap gets a layout of its own",
+            Self::Missing => {
+                return "there is no TEXCOORD_1 to keep: the lightmap gets a layout of its own".to_owned();
+            }
+            Self::Overlap(_) if !self.is_fatal() => {
+                return "triangles overlap a little in TEXCOORD_1, which is kept: there they show the light of one of \
+                        them"
+                    .to_owned();
+            }
             Self::MissingIn { .. } => "a primitive has no TEXCOORD_1",
             Self::Outside { .. } => "TEXCOORD_1 leaves the range from 0 to 1",
             Self::NoArea { .. } => "triangles have no area in TEXCOORD_1",
-            Self::Overlap { .. } => "triangles overlap in TEXCOORD_1",
+            Self::Overlap(_) => "triangles overlap in TEXCOORD_1",
         };
-        match self {
-            Self::Missing => reason.to_owned(),
-            _ => format!(
-                "{reason}, so it is not kept: the lightmap gets a layout of its own, and the old one moves to \
-                 TEXCOORD_2 if textures use it"
-            ),
-        }
+        format!(
+            "{reason}, so it is not kept: the lightmap gets a layout of its own, and the old one moves to TEXCOORD_2 if \
+             textures use it"
+        )
     }
 }
 
@@ -116,5 +129,5 @@ pub(super) fn fault(
     if lost > NO_AREA * area || density <= 0.0 {
         return Some(Fault::NoArea { count, all: triangles.len() });
     }
-    overlap(&triangles).map(|triangles| Fault::Overlap { triangles })
+    overlap(&triangles, MOST_SHARED, |_, _| true).map(Fault::Overlap)
 }

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use crate::scene::{ImportError, Placement, Scene, Warnings};
-use fault::fault;
+use fault::{Fault, fault};
 pub(crate) use map::{LEAST_STRETCH, least_stretch, mean_density};
 use overlap::overlap;
 
@@ -47,19 +47,20 @@ impl Authored {
         let (mut kept, mut others) = (Vec::new(), 0);
         let mut warnings = Warnings::default();
         for placements in lit_nodes(scene) {
-            match fault(scene, &placements, &coordinates) {
-                None => kept.push(placements),
-                Some(fault) => {
-                    others += 1;
-                    let Placement { node, mesh, .. } = *placements[0];
-                    let (node, mesh) = (scene.item("node", node), scene.item("mesh", mesh));
-                    warnings.about(format!("{node}, {mesh}{}", fault.detail()), fault.text());
-                }
+            let fault = fault(scene, &placements, &coordinates);
+            if let Some(fault) = fault {
+                let Placement { node, mesh, .. } = *placements[0];
+                let (node, mesh) = (scene.item("node", node), scene.item("mesh", mesh));
+                warnings.about(format!("{node}, {mesh}{}", fault.detail()), fault.text());
+            }
+            if fault.is_some_and(Fault::is_fatal) {
+                others += 1;
+            } else {
+                kept.push(placements);
             }
         }
         let mut block_of = vec![None; scene.placements.len()];
-        let all: Vec<[DVec2; 3]> = kept.iter().flatten().flat_map(|p| layout(p, &coordinates)).collect();
-        let is_one = overlap(&all).is_none();
+        let is_one = keep_clear(&kept, &coordinates);
         for (index, placements) in kept.iter().enumerate() {
             for placement in placements {
                 let triangle = scene.triangles.get(placement.triangles.start);
@@ -105,6 +106,16 @@ impl Authored {
     pub fn block_of(&self, placement: usize) -> Option<usize> {
         self.block_of.get(placement).copied().flatten()
     }
+}
+
+/// Whether no two nodes share room.
+fn keep_clear(nodes: &[Vec<&Placement>], coordinates: &[Option<[DVec2; 3]>]) -> bool {
+    let (mut triangles, mut owners) = (Vec::new(), Vec::new());
+    for (node, placements) in nodes.iter().enumerate() {
+        triangles.extend(placements.iter().flat_map(|placement| layout(placement, coordinates)));
+        owners.resize(triangles.len(), node);
+    }
+    overlap(&triangles, 0.0, |a, b| owners[a] != owners[b]).is_none()
 }
 
 /// The placements of each node that gets a lightmap, at least one each, in the order of the nodes' first.
