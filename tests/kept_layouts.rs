@@ -10,7 +10,7 @@ use cobake::options::{BakeOptions, DensityPolicy, Preview, Resolution, Toggle, T
 use cobake::progress::Silent;
 use cobake::scene::{ImportOptions, Scene, from_bytes};
 use cobake::{BakeResult, bake_scene};
-use glam::DVec2;
+use glam::{DVec2, Vec2Swizzles};
 use serde_json::{Value, json};
 
 #[path = "import/draft.rs"]
@@ -342,7 +342,11 @@ fn a_mesh_without_a_layout_gets_ours_beside_one_that_is_kept() {
         Layout::None,
     );
     // Both by light, which the kept layout cannot be.
-    let by_light = |keep| BakeOptions { density: DensityPolicy::Light, ..options(keep) };
+    let by_light = |keep| {
+        let mut options = options(keep);
+        options.density = DensityPolicy::Light;
+        options
+    };
     let (kept, own) = (model.bake(&by_light(Toggle::On)), model.bake(&by_light(Toggle::Off)));
     let layouts = kept.report.lightmap.layouts;
     assert_eq!((layouts.kept, layouts.not_kept), (1, 1));
