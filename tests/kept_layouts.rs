@@ -120,9 +120,24 @@ fn count(json: &Value, list: &str) -> usize {
     json[list].as_array().map_or(0, Vec::len)
 }
 
+/// The same in two halves that lie apart in the layout, one of them turned.
+fn halved_floor() -> Vec<Quad> {
+    let (low, high) = ([0.02, 0.02], [0.3, 0.58]);
+    let turned = [
+        [low[0] + 0.32, low[1]],
+        [low[0] + 0.32, high[1]],
+        [high[0] + 0.32, high[1]],
+        [high[0] + 0.32, low[1]],
+    ];
+    vec![
+        ([[-2.0, -2.0, 0.0], [0.0, -2.0, 0.0], [0.0, 2.0, 0.0], [-2.0, 2.0, 0.0]], cell(low, high)),
+        ([[0.0, 2.0, 0.0], [0.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0]], turned),
+    ]
+}
+
 /// A floor and a box in one layout, with room between.
 fn whole() -> Model {
-    let floor = floor(cell([0.02, 0.02], [0.6, 0.6]));
+    let floor = halved_floor();
     Model::new().node("Floor", &floor, Layout::Given).node(
         "Box",
         &cube([0.64, 0.02], [0.98, 0.25]),
@@ -211,6 +226,7 @@ fn a_layout_of_the_whole_scene_stays_to_the_byte_and_holds_the_same_light() {
         assert_eq!(bytes(&after, accessor(&after, node, 1).unwrap()), old);
         assert_eq!(accessor(&after, node, 2), None);
     }
+    assert_eq!(kept.surfaces.len(), own.surfaces.len() + 1, "the floor ends where its layout does");
     let difference = difference(&own, &kept);
     assert!(difference < SAME_LIGHT, "{difference}");
     // Without the option all is as ever.
@@ -305,16 +321,20 @@ fn what_is_no_layout_is_named_and_falls_back() {
     // All sides in one place, as a texture is laid on a box.
     let cell_of_all = cell([0.0, 0.0], [1.0, 1.0]);
     let stacked: Vec<Quad> = cube([0.0; 2], [1.0; 2]).into_iter().map(|quad| (quad.0, cell_of_all)).collect();
+    let bare = json!({"attributes": {"POSITION": 2}, "indices": 4, "material": 0});
     let model = Model::new()
         .node("Far", &far, Layout::Given)
         .node("Flat", &flat, Layout::Given)
         .set("/nodes/3/translation", json!([0, 0, -0.5]))
         .node("Stacked", &stacked, Layout::Given)
         .node("Bare", &cube([0.0; 2], [1.0; 2]), Layout::None)
-        .set("/nodes/5/translation", json!([1.2, 0, 0]));
+        .set("/nodes/5/translation", json!([1.2, 0, 0]))
+        .node("Half", &floor(cell([0.0; 2], [1.0; 2])), Layout::Given)
+        .set("/nodes/6/translation", json!([0, 0, -1]))
+        .set("/meshes/4/primitives/-", bare);
     let (kept, own) = (model.bake(&options(Toggle::On)), model.bake(&options(Toggle::Off)));
     let layouts = kept.report.lightmap.layouts;
-    assert_eq!((layouts.kept, layouts.not_kept), (0, 4));
+    assert_eq!((layouts.kept, layouts.not_kept), (0, 5));
     assert!(kept.glb == own.glb, "the same output");
     let warnings = kept.report.warnings;
     let expected = [
@@ -325,12 +345,13 @@ fn what_is_no_layout_is_named_and_falls_back() {
         ["node 3 (\"Flat\"), mesh 1 (\"FlatMesh\") (2 of 2 triangles)", "have no area in TEXCOORD_1"],
         ["node 4 (\"Stacked\"), mesh 2 (\"StackedMesh\") (such as triangles", "overlap in TEXCOORD_1"],
         ["node 5 (\"Bare\"), mesh 3 (\"BareMesh\")", "there is no TEXCOORD_1 to keep"],
+        ["node 6 (\"Half\"), mesh 4 (\"HalfMesh\") (primitive 1)", "a primitive has no TEXCOORD_1"],
     ];
     for words in expected {
         let says = |warning: &String| words.iter().all(|word| warning.contains(word));
         assert!(warnings.iter().any(says), "{words:?} in {warnings:?}");
     }
-    assert_eq!(own.report.warnings.len() + 4, warnings.len());
+    assert_eq!(own.report.warnings.len() + 5, warnings.len());
 }
 
 #[test]
@@ -364,7 +385,7 @@ fn a_mesh_without_a_layout_gets_ours_beside_one_that_is_kept() {
 fn what_is_not_lit_leaves_the_layout_whole() {
     let model = whole().set("/nodes/3/extras", json!({"cobake": {"bake": false}}));
     let kept = model.bake(&options(Toggle::On));
-    assert_eq!((kept.atlas.width, kept.atlas.charts.len()), (256, 1));
+    assert_eq!((kept.atlas.width, kept.atlas.charts.len()), (256, 2));
     let scene = reread(&kept);
     let old = bytes(&model.scene(), accessor(&model.scene(), 2, 1).unwrap());
     assert_eq!(bytes(&scene, accessor(&scene, 2, 1).unwrap()), old);

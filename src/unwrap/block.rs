@@ -151,3 +151,25 @@ impl Block {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_found_again_and_slivers_get_one_that_can_be_inverted() {
+        let map = DAffine2::from_mat2_translation(
+            DMat2::from_cols(DVec2::new(0.1, 0.02), DVec2::new(0.03, -0.2)),
+            DVec2::new(0.4, 0.5),
+        );
+        let points = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.5, 1.5)].map(DVec2::from);
+        let found = uv_from_plane(&points.map(|p| (p, map.transform_point2(p))), 0.1);
+        assert!(found.abs_diff_eq(map, 1e-12), "{found:?}");
+        // A triangle that is a line in the layout keeps its place and gets area.
+        let line = uv_from_plane(&[points[0], points[1], points[2]].map(|p| (p, DVec2::new(p.x, p.x))), 0.1);
+        assert!((line.matrix2.determinant() - 0.01).abs() < 1e-12, "{line:?}");
+        let middle = (points[0] + points[1] + points[2]) / 3.0;
+        assert!(line.transform_point2(middle).distance(DVec2::splat(middle.x)) < 1e-12);
+        assert!(uv_from_plane(&[], 0.1).is_finite());
+    }
+}
