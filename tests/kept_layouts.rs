@@ -408,6 +408,25 @@ fn textures_on_the_same_set_find_their_coordinates() {
     }
 }
 
+/// Nodes whose layouts meet by a hair are parts of one; by more, each is a block.
+#[test]
+fn layouts_that_hardly_meet_are_one() {
+    let page = |from: f32| {
+        let upper = floor(cell([from, 0.0], [from + 0.4, 0.4]));
+        let model = Model::new()
+            .node("Lower", &floor(cell([0.0, 0.0], [0.5, 0.5])), Layout::Given)
+            .node("Upper", &upper, Layout::Given)
+            .set("/nodes/3/translation", json!([0, 0, 0.5]));
+        let kept = model.bake(&options(Toggle::On));
+        assert_eq!(kept.report.lightmap.layouts.kept, 2);
+        let stays = coordinates(&reread(&kept), 3) == coordinates(&model.scene(), 3);
+        (stays, kept.report.lightmap.layouts.shared_texels > 0)
+    };
+    assert_eq!(page(0.55), (true, false));
+    assert_eq!(page(0.497), (true, true));
+    assert_eq!(page(0.45), (false, false));
+}
+
 /// Sides of a box that touch in the layout, but not where they do on the box, share texels; so they do not with room
 /// between.
 #[test]

@@ -1,10 +1,12 @@
 //! What keeps a node's texture coordinates from being a lightmap layout.
 
+use std::ops::ControlFlow;
+
 use glam::DVec2;
 
-use super::layout;
 use super::map::{LEAST_STRETCH, mean_density, stretch};
-use super::overlap::{Overlap, overlap};
+use super::overlap::overlaps;
+use super::{area, layout};
 use crate::geom::triangle::area_normal;
 use crate::scene::{Placement, Scene};
 
@@ -16,7 +18,7 @@ const NO_AREA: f64 = 1e-3;
 
 /// Triangles may share this fraction of a layout's area. Automatic unwrappings of fine models fold over themselves here
 /// and there by less than a texel: 1.4 % of the layout of PlayCanvas's house.
-const MOST_SHARED: f64 = 0.02;
+pub(super) const MOST_SHARED: f64 = 0.02;
 
 /// Why a node's layout cannot be kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,8 +43,13 @@ pub(super) enum Fault {
         /// of all that the node has.
         all: usize,
     },
-    /// Triangles share room in it: not kept beyond [`MOST_SHARED`].
-    Overlap(Overlap),
+    /// Triangles share room in it.
+    Overlap {
+        /// As a fraction of its area, at least; the layout is not kept beyond [`MOST_SHARED`].
+        share: f64,
+        /// Two of them, counted through the node's primitives.
+        triangles: [usize; 2],
+    },
 }
 
 impl Fault {
@@ -55,16 +62,16 @@ impl Fault {
                 format!(" (from {:.3}, {:.3} to {:.3}, {:.3})", low.x, low.y, high.x, high.y)
             }
             Self::NoArea { count, all } => format!(" ({count} of {all} triangles)"),
-            Self::Overlap(Overlap { share, triangles: [a, b] }) if !self.is_fatal() => {
+            Self::Overlap { share, triangles: [a, b] } if !self.is_fatal() => {
                 format!(" ({:.2} % of its area, such as triangles {a} and {b})", 100.0 * share)
             }
-            Self::Overlap(Overlap { triangles: [a, b], .. }) => format!(" (such as triangles {a} and {b})"),
+            Self::Overlap { triangles: [a, b], .. } => format!(" (such as triangles {a} and {b})"),
         }
     }
 
     /// Whether the layout cannot be kept for it.
     pub(super) fn is_fatal(self) -> bool {
-        !matches!(self, Self::Overlap(Overlap { share, .. }) if share <= MOST_SHARED)
+        !matches!(self, Self::Overlap { share, .. } if share <= MOST_SHARED)
     }
 
     /// The reason and what happens instead, the same words for all nodes.
@@ -73,7 +80,7 @@ impl Fault {
             Self::Missing => {
                 return "there is no TEXCOORD_1 to keep: the lightmap gets a layout of its own".to_owned();
             }
-            Self::Overlap(_) if !self.is_fatal() => {
+            Self::Overlap { .. } if !self.is_fatal() => {
                 return "triangles overlap a little in TEXCOORD_1, which is kept: there they show the light of one of \
                         them"
                     .to_owned();
@@ -81,7 +88,7 @@ impl Fault {
             Self::MissingIn { .. } => "a primitive has no TEXCOORD_1",
             Self::Outside { .. } => "TEXCOORD_1 leaves the range from 0 to 1",
             Self::NoArea { .. } => "triangles have no area in TEXCOORD_1",
-            Self::Overlap(_) => "triangles overlap in TEXCOORD_1",
+            Self::Overlap { .. } => "triangles overlap in TEXCOORD_1",
         };
         format!(
             "{reason}, so it is not kept: the lightmap gets a layout of its own, and the old one moves to TEXCOORD_2 if \
@@ -116,18 +123,25 @@ pub(super) fn fault(
         placements.iter().flat_map(|p| scene.triangles.get(p.triangles.clone()).unwrap_or_default());
     let pairs: Vec<_> = corners.map(|t| scene.corners(t)).zip(triangles.iter().copied()).collect();
     let density = mean_density(pairs.iter().copied());
-    let (mut count, mut lost, mut area) = (0, 0.0, 0.0);
+    let (mut count, mut lost, mut all) = (0, 0.0, 0.0);
     for &(points, uv) in &pairs {
         let own = area_normal(points).length();
-        area += own;
+        all += own;
         // What has no area in the scene needs none in the layout.
         let stretch = stretch(points, uv);
         if own > 0.0 && stretch.is_some_and(|least| least <= LEAST_STRETCH * density) {
             (count, lost) = (count + 1, lost + own);
         }
     }
-    if lost > NO_AREA * area || density <= 0.0 {
+    if lost > NO_AREA * all || density <= 0.0 {
         return Some(Fault::NoArea { count, all: triangles.len() });
     }
-    overlap(&triangles, MOST_SHARED, |_, _| true).map(Fault::Overlap)
+    let whole = area(&triangles);
+    let (mut first, mut share) = (None, 0.0);
+    let _ = overlaps(&triangles, |pair, area| {
+        first = first.or(Some(pair));
+        share += area / whole;
+        if share > MOST_SHARED { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    first.map(|triangles| Fault::Overlap { share, triangles })
 }

@@ -11,13 +11,15 @@ mod map;
 mod overlap;
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use glam::DVec2;
 
+use crate::geom::polygon::orient;
 use crate::scene::{ImportError, Placement, Scene, Warnings};
-use fault::{Fault, fault};
+use fault::{Fault, MOST_SHARED, fault};
 pub(crate) use map::{LEAST_STRETCH, least_stretch, mean_density};
-use overlap::overlap;
+use overlap::overlaps;
 
 /// The set that lightmap layouts live in.
 const SET: u32 = 1;
@@ -108,14 +110,31 @@ impl Authored {
     }
 }
 
-/// Whether no two nodes share room.
+/// Whether the nodes' layouts are parts of one: none shares more room with others than its own triangles may share.
 fn keep_clear(nodes: &[Vec<&Placement>], coordinates: &[Option<[DVec2; 3]>]) -> bool {
-    let (mut triangles, mut owners) = (Vec::new(), Vec::new());
+    let (mut triangles, mut owners, mut room) = (Vec::new(), Vec::new(), Vec::new());
     for (node, placements) in nodes.iter().enumerate() {
-        triangles.extend(placements.iter().flat_map(|placement| layout(placement, coordinates)));
+        let own: Vec<[DVec2; 3]> = placements.iter().flat_map(|p| layout(p, coordinates)).collect();
+        room.push(MOST_SHARED * area(&own));
+        triangles.extend(own);
         owners.resize(triangles.len(), node);
     }
-    overlap(&triangles, 0.0, |a, b| owners[a] != owners[b]).is_none()
+    let end = overlaps(&triangles, |[a, b], area| {
+        if owners[a] == owners[b] {
+            return ControlFlow::Continue(());
+        }
+        let mut take = |node: usize| {
+            room[node] -= area;
+            room[node] < 0.0
+        };
+        if take(owners[a]) || take(owners[b]) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    end.is_continue()
+}
+
+/// The area of triangles in a layout.
+fn area(triangles: &[[DVec2; 3]]) -> f64 {
+    triangles.iter().map(|&[a, b, c]| orient(a, b, c).abs() / 2.0).sum()
 }
 
 /// The placements of each node that gets a lightmap, at least one each, in the order of the nodes' first.

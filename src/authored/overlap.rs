@@ -1,5 +1,7 @@
 //! Whether triangles in the plane share room.
 
+use std::ops::ControlFlow;
+
 use glam::DVec2;
 
 use crate::geom::TriangleGrid;
@@ -9,23 +11,12 @@ use crate::geom::polygon::{clip_half_plane, orient, signed_area};
 /// of 32 after a few sums, leave at edges.
 const SLACK: f64 = 5e-5;
 
-/// Triangles that share room.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Overlap {
-    /// Area that two triangles share against the area of all, at least; the search ends where it exceeds the limit.
-    pub(super) share: f64,
-    /// The first two found, by their indices.
-    pub(super) triangles: [usize; 2],
-}
-
-/// Which of the triangles overlap, of those pairs that `count`; `None` where none do by more than slack.
-///
-/// Looks on until they share more than the fraction `limit` of their area.
-pub(super) fn overlap(
+/// Calls `visit` with each two triangles (their indices) that overlap by more than slack, and the area that they share,
+/// until it breaks off.
+pub(super) fn overlaps(
     triangles: &[[DVec2; 3]],
-    limit: f64,
-    counts: impl Fn(usize, usize) -> bool,
-) -> Option<Overlap> {
+    mut visit: impl FnMut([usize; 2], f64) -> ControlFlow<()>,
+) -> ControlFlow<()> {
     let (low, high) = triangles
         .iter()
         .flatten()
@@ -35,9 +26,7 @@ pub(super) fn overlap(
         .iter()
         .map(|&[a, b, c]| if orient(a, b, c) < 0.0 { [a, c, b] } else { [a, b, c] })
         .collect();
-    let all: f64 = upright.iter().map(|&[a, b, c]| orient(a, b, c) / 2.0).sum();
     let grid = TriangleGrid::new(&upright);
-    let mut found: Option<Overlap> = None;
     for bucket in grid.buckets() {
         for (index, &a) in bucket.iter().enumerate() {
             for &b in bucket.get(index + 1..).unwrap_or_default() {
@@ -46,19 +35,13 @@ pub(super) fn overlap(
                 let is_apart = || is_beside(one, other, slack) || is_beside(other, one, slack);
                 // Of the buckets that both lie in, one counts.
                 let corner = least(one).max(least(other));
-                if !counts(a, b) || is_apart() || !std::ptr::eq(bucket, grid.candidates(corner)) {
-                    continue;
-                }
-                let shared = shared_area(one, other) / all;
-                let overlap = found.get_or_insert(Overlap { share: 0.0, triangles: [a, b] });
-                overlap.share += shared;
-                if overlap.share > limit {
-                    return found;
+                if !is_apart() && std::ptr::eq(bucket, grid.candidates(corner)) {
+                    visit([a, b], shared_area(one, other))?;
                 }
             }
         }
     }
-    found
+    ControlFlow::Continue(())
 }
 
 /// The area that two counter-clockwise triangles share.
@@ -93,8 +76,18 @@ mod tests {
         corners.map(DVec2::from)
     }
 
+    fn found(triangles: &[[DVec2; 3]]) -> Vec<([usize; 2], f64)> {
+        let mut found = Vec::new();
+        let end = overlaps(triangles, |pair, area| {
+            found.push((pair, area));
+            ControlFlow::Continue(())
+        });
+        assert!(end.is_continue());
+        found
+    }
+
     fn pair(triangles: &[[DVec2; 3]]) -> Option<[usize; 2]> {
-        overlap(triangles, 0.0, |_, _| true).map(|overlap| overlap.triangles)
+        found(triangles).first().map(|&(pair, _)| pair)
     }
 
     #[test]
@@ -125,11 +118,9 @@ mod tests {
         assert_eq!(pair(&all), Some([1234, 2500]));
         // Over all of the square: the room of all the others is shared.
         all[2500] = triangle([(0.0, 0.0), (2.0, 0.0), (0.0, 2.0)]);
-        let small = 0.5 * (0.9_f64 / 50.0).powi(2) * 2500.0;
-        let share = overlap(&all, 1.0, |_, _| true).expect("some").share;
-        let expected =
-            (small - 0.5 * (0.9_f64 / 50.0).powi(2)) / (small + 2.0 - 0.5 * (0.9_f64 / 50.0).powi(2));
-        assert!((share / expected - 1.0).abs() < 1e-3, "{share} {expected}");
-        assert_eq!(overlap(&all, 1.0, |_, b| b != 2500), None);
+        let shared: f64 = found(&all).iter().map(|(_, area)| area).sum();
+        let expected = 2500.0 * 0.5 * (0.9_f64 / 50.0).powi(2);
+        assert!((shared / expected - 1.0).abs() < 1e-9, "{shared} {expected}");
+        assert!(overlaps(&all, |_, _| ControlFlow::Break(())).is_break());
     }
 }
