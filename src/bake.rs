@@ -4,10 +4,11 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use crate::authored::Authored;
 use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
 use crate::export::{Baked, encode};
-use crate::options::{BakeOptions, Resolution};
+use crate::options::{BakeOptions, DensityPolicy, Resolution, Toggle};
 use crate::progress::{Progress, Stage};
 use crate::raster::{Lighting, Lightmap, RasterInput};
 use crate::report::{Recorder, Report};
@@ -17,8 +18,8 @@ use crate::scene::{ImportOptions, Scene};
 use crate::solve::{Problem, Solution, solve};
 use crate::surface::{Geometry, Surface, build_surfaces};
 use crate::trace::Tracer;
-use crate::unwrap::{Atlas, check_side};
-use page::{Page, PageMaker};
+use crate::unwrap::{Atlas, blocks, check_side, shared_texels};
+use page::{Page, PageMaker, Wishes};
 use scale::Scale;
 use written::Written;
 
@@ -94,14 +95,20 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     scene.warnings.iter().for_each(|w| recorder.warn(w));
     enter(&mut recorder, Stage::Surfaces)?;
     let tracer = tracer(scene);
-    let set = build_surfaces(&Geometry::from(scene), &tracer);
+    let authored = authored(scene, options, &mut recorder)?;
+    let geometry = Geometry { coordinates: authored.coordinates(), ..Geometry::from(scene) };
+    let set = build_surfaces(&geometry, &tracer);
     account::warn_of_surfaces(&set, &mut recorder);
     account::warn_of_reflectance(scene, options, &mut recorder);
     let surfaces = set.surfaces;
-    if let Resolution::Size(side) = options.resolution {
-        check_side(surfaces.len(), (side, options.pages), options.padding)?;
-    }
     let weights = weights::of_surfaces(scene, &surfaces, options)?;
+    let wishes = Wishes::new(scene, &surfaces, weights, blocks(&authored, &surfaces, scene));
+    // A layout from elsewhere is as dense as it is.
+    let density = if wishes.blocks.is_empty() { options.density } else { DensityPolicy::Uniform };
+    let options = &BakeOptions { density, ..options.clone() };
+    if let Resolution::Size(side) = options.resolution {
+        check_side(wishes.charts(), (side, options.pages), options.padding)?;
+    }
     let appearance = SceneAppearance::new(scene, &surfaces, options.max_reflectance);
     let scale = Scale::of(&surfaces, options);
     let mesh_options = MeshOptions {
@@ -148,9 +155,10 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         options,
     };
     let lighting = Lighting::new(&raster_input);
-    let nodes = scene.placements.iter().map(|placement| placement.node).collect();
-    let Page { atlas, lightmap, preview, texels } =
-        PageMaker::new(&lighting, options, scale.texel, weights, nodes).page(&mut recorder)?;
+    let maker = PageMaker::new(&lighting, options, scale.texel, wishes);
+    let Page { atlas, lightmap, preview, texels } = maker.page(&mut recorder)?;
+    let shared = shared_texels((&surfaces, maker.blocks()), (&authored, scene), &atlas);
+    account::warn_of_shared_texels(shared, texels, &mut recorder);
 
     enter(&mut recorder, Stage::Export)?;
     let glb = encode(&Baked {
@@ -161,12 +169,14 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
         preview: preview.as_ref(),
         mesh: &mesh,
         facets: &solution.facets,
+        authored: &authored,
         options,
     })?;
     let mut report = Report { options: options.clone(), ..Report::default() };
     report.elements.initial = initial;
     account::fill_report(&mut report, scene, &surfaces, &solution);
     account::fill_texels(&mut report, (&surfaces, &atlas), texels);
+    report.lightmap.layouts = account::layouts(&authored, shared);
     let written = Written::in_document(&glb);
     (report.lightmap.bytes, report.lightmap.png_bytes) = (written.exr(), written.png());
     report.lightmap.pages = account::pages(&atlas, &written);
@@ -174,6 +184,16 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     drop(appearance);
     let Solution { facets, .. } = solution;
     Ok(BakeResult { glb, lightmap, surfaces, facets, mesh, atlas, report })
+}
+
+/// The layouts that are kept, and a warning for each reason why one is not.
+fn authored(scene: &Scene, options: &BakeOptions, recorder: &mut Recorder) -> Result<Authored, Error> {
+    if options.keep_uv1 == Toggle::Off {
+        return Ok(Authored::default());
+    }
+    let authored = Authored::of(scene)?;
+    authored.warnings().iter().for_each(|warning| recorder.warn(warning));
+    Ok(authored)
 }
 
 fn enter(recorder: &mut Recorder, stage: Stage) -> Result<(), Error> {

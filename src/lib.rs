@@ -1,4 +1,5 @@
 //! cobake bakes lightmaps: glTF in, glTF with EXR lightmaps out.
+pub mod authored;
 mod bake;
 pub mod cob;
 pub mod compare;

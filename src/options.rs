@@ -206,6 +206,9 @@ pub struct BakeOptions {
     pub elements: Toggle,
     /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
     pub dynamic: Dynamic,
+    /// Whether a `TEXCOORD_1` that is a lightmap layout is kept and used; a warning says which are none, and why. With
+    /// one that is, [`DensityPolicy::Uniform`] holds for all the rest; goes with no [`mips`](Self::mips). Default: no.
+    pub keep_uv1: Toggle,
 }
 
 /// A choice between on and off that reads as a word.
@@ -245,6 +248,7 @@ impl Default for BakeOptions {
             scene: None,
             elements: Toggle::Off,
             dynamic: Dynamic::default(),
+            keep_uv1: Toggle::Off,
         }
     }
 }
@@ -303,6 +307,8 @@ impl BakeOptions {
         }
         let most = crate::unwrap::MOST_MIPS;
         check(self.mips <= most, "mips", f64::from(self.mips), "between 0 and 4 levels")?;
+        let range = "0 with --keep-uv1, since the input's layout keeps to no cells; leave one of them out";
+        check(self.keep_uv1 == Toggle::Off || self.mips == 0, "mips", f64::from(self.mips), range)?;
         check((1..=64).contains(&self.pages), "pages", f64::from(self.pages), "between 1 and 64")?;
         let m = self.illumination_threshold;
         check(m > 0.0 && m <= 1.0, "illumination-threshold", m, "above 0 and at most 1")?;

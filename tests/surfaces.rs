@@ -62,6 +62,7 @@ impl Model {
             triangles: &self.triangles,
             placements: &self.placements,
             double_sided: self.double_sided.clone(),
+            coordinates: &[],
         };
         let set = build_surfaces(&geometry, &EachBox(self));
         self.check(&set);
@@ -239,6 +240,7 @@ fn a_fine_cylinder_does_not_become_one_surface() {
         triangles: &model.triangles,
         placements: &model.placements,
         double_sided: vec![false],
+        coordinates: &[],
     };
     struct Nothing;
     impl BoxQuery for Nothing {

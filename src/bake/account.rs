@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 
+use crate::authored::Authored;
 use crate::cob::{Cob, CobState};
 use crate::element::Facet;
 use crate::options::BakeOptions;
 use crate::progress::Progress;
 use crate::raster::TexelCounts;
-use crate::report::{DensityReport, PageReport, Report};
+use crate::report::{DensityReport, LayoutReport, PageReport, Report};
 use crate::scene::Scene;
 use crate::solve::Solution;
 use crate::surface::{Surface, SurfaceSet};
@@ -62,6 +63,23 @@ pub(super) fn warn_of_dropped(dropped: usize, progress: &mut dyn Progress) {
             "{dropped} points or edges of the mesh could not be triangulated and were left out"
         ));
     }
+}
+
+/// Says that a kept layout lets light bleed.
+pub(super) fn warn_of_shared_texels(shared: u64, texels: TexelCounts, progress: &mut dyn Progress) {
+    if shared > 0 {
+        progress.warn(&format!(
+            "{shared} of {} texels are read from parts of a kept TEXCOORD_1 that are no neighbours, so that light bleeds \
+             from one to another; ask for a larger --size, or leave --keep-uv1 out",
+            texels.covered
+        ));
+    }
+}
+
+/// Whose layout was kept.
+pub(super) fn layouts(authored: &Authored, shared_texels: u64) -> LayoutReport {
+    let (kept, others) = authored.nodes();
+    LayoutReport { kept: kept as u64, not_kept: others as u64, shared_texels }
 }
 
 pub(super) fn leaf_count(facets: &[Facet]) -> u64 {

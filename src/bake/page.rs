@@ -6,9 +6,10 @@ use crate::options::{BakeOptions, DensityPolicy, Resolution};
 use crate::progress::Stage;
 use crate::raster::{Lighting, Lightmap, Rasterized, TexelCounts, rasterize};
 use crate::report::Recorder;
+use crate::scene::Scene;
 use crate::surface::Surface;
 use crate::unwrap::{
-    Atlas, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_gutter, unwrap_groups, whole,
+    Atlas, Block, Part, Room, UnwrapError, UnwrapOptions, area_within, mean_gutter, unwrap_groups, whole,
 };
 
 use super::budget::{self, texels_for};
@@ -45,10 +46,46 @@ pub(super) struct PageMaker<'a> {
     texel: f64,
     /// Where the light needs texels, if it decides; it is asked once, for about the texels that are expected.
     survey: Option<LightSurvey>,
+    wishes: Wishes,
+}
+
+/// What is wished of charts.
+pub(super) struct Wishes {
     /// How many times as dense as else texels lie on each surface.
-    weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
     /// The node of each placement: its surfaces share a page where they can.
-    nodes: Vec<usize>,
+    pub(super) nodes: Vec<usize>,
+    /// Surfaces that keep the input's layout. Where there are some, texels are as dense everywhere.
+    pub(super) blocks: Vec<Block>,
+    /// For each surface whether it gets a chart of its own.
+    pub(super) charted: Vec<bool>,
+}
+
+impl Wishes {
+    pub(super) fn new(
+        scene: &Scene,
+        surfaces: &[Surface],
+        weights: Vec<f64>,
+        mut blocks: Vec<Block>,
+    ) -> Self {
+        let mut charted = vec![true; surfaces.len()];
+        if !blocks.is_empty() {
+            let is_lit = |s: &Surface| scene.placements.get(s.placement).is_none_or(|p| p.settings.bake);
+            charted = surfaces.iter().map(is_lit).collect();
+        }
+        for block in &mut blocks {
+            block.members.iter().for_each(|member| charted[member.surface] = false);
+            let sum: f64 = block.members.iter().map(|member| weights[member.surface]).sum();
+            block.weight = sum / block.members.len().max(1) as f64;
+        }
+        let nodes = scene.placements.iter().map(|placement| placement.node).collect();
+        Self { weights, nodes, blocks, charted }
+    }
+
+    /// The fewest charts that are packed.
+    pub(super) fn charts(&self) -> usize {
+        self.blocks.len() + self.charted.iter().filter(|&&charted| charted).count()
+    }
 }
 
 impl<'a> PageMaker<'a> {
@@ -56,10 +93,9 @@ impl<'a> PageMaker<'a> {
         lighting: &'a Lighting<'a>,
         options: &'a BakeOptions,
         texel: f64,
-        weights: Vec<f64>,
-        nodes: Vec<usize>,
+        wishes: Wishes,
     ) -> Self {
-        let mut maker = Self { lighting, options, texel, survey: None, weights, nodes };
+        let mut maker = Self { lighting, options, texel, survey: None, wishes };
         if options.density == DensityPolicy::Light {
             let density = maker.density(maker.room(), options.padding);
             maker.survey = Some(LightSurvey::of(lighting, density));
@@ -92,8 +128,13 @@ impl<'a> PageMaker<'a> {
         enter(recorder, Stage::Unwrap)?;
         let surfaces = self.lighting.surfaces();
         let unwrapping = self.unwrapping(Room::Texels(0.0), Some(self.options.padding.unwrap_or(0)));
-        let atlas = self.unwrap(&whole(surfaces), &unwrapping)?;
+        let atlas = self.unwrap(&self.whole(surfaces), &unwrapping)?;
         self.paint(atlas, recorder)
+    }
+
+    /// Surfaces that keep the input's layout.
+    pub(super) fn blocks(&self) -> &[Block] {
+        &self.wishes.blocks
     }
 
     /// What a page of this solution holds.
@@ -133,12 +174,12 @@ impl<'a> PageMaker<'a> {
         let mut unwrapping = self.unwrapping(room, padding);
         let parts = match &self.survey {
             None => {
-                let mut parts = whole(surfaces);
-                parts.iter_mut().for_each(|part| part.weight *= self.weights[part.surface]);
+                let mut parts = self.whole(surfaces);
+                parts.iter_mut().for_each(|part| part.weight *= self.wishes.weights[part.surface]);
                 parts
             }
             Some(survey) => {
-                let mut parts = survey.cut(surfaces, &self.weights, self.density(room, padding));
+                let mut parts = survey.cut(surfaces, &self.wishes.weights, self.density(room, padding));
                 let mean = normalize(surfaces, &mut parts);
                 if !matches!(room, Room::Density(_)) {
                     unwrapping.most = Some(SPARE * mean);
@@ -149,9 +190,16 @@ impl<'a> PageMaker<'a> {
         self.unwrap(&parts, &unwrapping)
     }
 
+    /// A part for each surface that gets a chart of its own.
+    fn whole(&self, surfaces: &[Surface]) -> Vec<Part> {
+        let mut parts = whole(surfaces);
+        parts.retain(|part| self.wishes.charted[part.surface]);
+        parts
+    }
+
     fn unwrap(&self, parts: &[Part], unwrapping: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
-        let node = |surface: &Surface| self.nodes.get(surface.placement).copied().unwrap_or(0);
-        unwrap_groups(self.lighting.surfaces(), parts, &node, unwrapping)
+        let node = |surface: &Surface| self.wishes.nodes.get(surface.placement).copied().unwrap_or(0);
+        unwrap_groups(self.lighting.surfaces(), (&self.wishes.blocks, parts), &node, unwrapping)
     }
 
     /// What deciding on density must know of the page.

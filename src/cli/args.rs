@@ -118,6 +118,11 @@ pub(crate) struct BakeArgs {
     #[arg(long, value_name = "LEVELS", default_value_t = BakeOptions::default().mips, help_heading = LIGHTMAP)]
     mips: u32,
 
+    /// Keep and use a TEXCOORD_1 that is a lightmap layout: in the range from 0 to 1, without overlaps; says which are
+    /// none, and why
+    #[arg(long = "keep-uv1", help_heading = LIGHTMAP)]
+    keep_uv1: bool,
+
     /// What a texel holds [default: irradiance, or what --for takes]
     #[arg(long, value_enum, help_heading = LIGHTMAP)]
     quantity: Option<QuantityWord>,
@@ -366,6 +371,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.scene = args.scene;
         options.elements = if args.elements { Toggle::On } else { Toggle::Off };
         options.dynamic = args.dynamic.into();
+        options.keep_uv1 = if args.keep_uv1 { Toggle::On } else { Toggle::Off };
         options
     }
 }
@@ -399,7 +405,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --pages 5 --scene 1 --dynamic cast --elements",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --pages 5 --scene 1 --dynamic cast --elements --keep-uv1",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -422,6 +428,7 @@ mod tests {
         meant.scene = Some(1);
         meant.dynamic = Dynamic::Cast;
         meant.elements = Toggle::On;
+        meant.keep_uv1 = Toggle::On;
         assert_eq!(typed, meant);
     }
 

@@ -19,7 +19,7 @@ use super::cut::ChartedMesh;
 use super::document::Object;
 use super::interpolation::{Locator, PlaneTriangle, Rows};
 use super::pool::{Choice, chart_coordinates};
-use super::primitive::{insert_coordinates, prepare};
+use super::primitive::{OldSet, insert_coordinates, prepare};
 use super::transform::world_from_node;
 use super::writer::Writer;
 use crate::retriangulate::{MeshVertex, SurfaceMesh};
@@ -60,8 +60,8 @@ pub(super) fn rewrite<'a>(
                     primitives[placement.primitive] = Value::Null;
                     continue;
                 }
-                let page = (placement.mesh, choice.page);
-                prepare(&mut writer.document, &mut writer.materials, primitive, page)?;
+                let place = (placement.mesh, choice.page, OldSet::Yields);
+                prepare(&mut writer.document, &mut writer.materials, primitive, place)?;
                 let attributes = primitive.get("attributes").and_then(Value::as_object);
                 let rows = Rows::read(writer.document.source, attributes, placement.vertices.len())?;
                 let mut builder = Builder { node_from_world, rows, ..Builder::default() };

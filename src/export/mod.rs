@@ -18,6 +18,9 @@
 //!
 //! With [`BakeOptions::elements`] the elements and the states of their Close Objects Buffers are there to look at.
 //!
+//! Where a node's own layout is kept, `TEXCOORD_1` is that, moved and scaled with the block that it lies in, or the very
+//! accessor where the page is that block.
+//!
 //! What is not lit stays as it was: nodes, names, animations, skins, cameras, lights, extras, and
 //! extensions that nobody here knows. With [`Topology::Source`] the triangles stay as well.
 //!
@@ -66,6 +69,7 @@ pub use verify::verify;
 pub use write::{WrittenFile, file_of, write, write_all, write_whole};
 pub(crate) use writer::COBAKE_LIGHTMAP;
 
+use crate::authored::Authored;
 use crate::element::Facet;
 use crate::options::BakeOptions;
 use crate::raster::Lightmap;
@@ -91,6 +95,8 @@ pub struct Baked<'a> {
     pub mesh: &'a RadiosityMesh,
     /// The elements that the solution was made on; written with [`elements`](BakeOptions::elements).
     pub facets: &'a [Facet],
+    /// Whose layout was kept, and so lies in one of the atlas's blocks.
+    pub authored: &'a Authored,
     /// What the bake was told; says what the texels hold and which geometry to write.
     pub options: &'a BakeOptions,
 }

@@ -11,6 +11,7 @@ use serde_json::Value;
 use super::cut::Cuts;
 use super::document::{Object, index_of};
 use super::{Baked, ExportError};
+use crate::surface::Surface;
 use crate::unwrap::Atlas;
 
 /// A node whose mesh is lit.
@@ -143,7 +144,11 @@ pub(super) fn primitive_materials(primitive: &Object) -> Vec<usize> {
 
 /// Turns the surfaces' lists of triangles round.
 fn surface_of(baked: &Baked) -> Result<Vec<Option<usize>>, ExportError> {
-    if (0..baked.surfaces.len()).any(|surface| baked.atlas.charts_of(surface).is_empty()) {
+    let is_lit = |surface: &Surface| {
+        baked.scene.placements.get(surface.placement).is_none_or(|placement| placement.settings.bake)
+    };
+    let lacks = |(index, surface)| is_lit(surface) && baked.atlas.charts_of(index).is_empty();
+    if baked.surfaces.iter().enumerate().any(lacks) {
         return Err(ExportError::Mismatch { what: "charts" });
     }
     let mut surface_of = vec![None; baked.scene.triangles.len()];

@@ -94,6 +94,33 @@ impl Charted<'_> {
     }
 }
 
+impl Charted<'_> {
+    /// The pool of placements whose vertices have `coordinates` of their own, whatever charts their triangles lie in.
+    pub(super) fn uncharted_pool(
+        &self,
+        placements: &[&Placement],
+        coordinates: &[[f32; 2]],
+    ) -> Result<Pool, ExportError> {
+        let triangles = |placement: &&Placement| {
+            let own = self.baked.scene.triangles.get(placement.triangles.clone());
+            let own = own.ok_or(ExportError::Mismatch { what: "placements" })?;
+            let source_winding = |triangle: &Triangle| {
+                let [a, b, c] = triangle.source_vertices;
+                if placement.mirrored { [a, c, b] } else { [a, b, c] }
+            };
+            Ok(own.iter().map(source_winding).collect())
+        };
+        Ok(Pool {
+            vertices: (0_u32..).take(coordinates.len()).map(Blend::copy_of).collect(),
+            coordinates: coordinates.to_vec(),
+            corners: placements.iter().map(triangles).collect::<Result<_, ExportError>>()?,
+            unsplit: true,
+            partial: false,
+            complete: true,
+        })
+    }
+}
+
 /// Of a node's triangles those that one page lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Choice {

@@ -11,14 +11,22 @@ use super::plan::primitive_materials;
 /// Geometry compression: its data are of the old geometry.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Frees set 1 of a primitive of `mesh` and gives it materials that carry the lightmap's `page`.
-///
-/// A set 1 that a material reads moves to the next free set; one that nobody reads goes.
+/// What becomes of a primitive's texture coordinate set 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OldSet {
+    /// It makes room for the lightmap's: one that a material reads moves to the next free set; one that nobody reads
+    /// goes.
+    Yields,
+    /// It is the lightmap's.
+    Stays,
+}
+
+/// Gives a primitive of `mesh` materials that carry the lightmap's `page`, and its set 1 its place.
 pub(super) fn prepare(
     document: &mut Document,
     materials: &mut Materials,
     primitive: &mut Object,
-    (mesh, page): (usize, usize),
+    (mesh, page, old_set): (usize, usize, OldSet),
 ) -> Result<(), ExportError> {
     if drop_extensions(primitive, &[DRACO]) && !has_data(document, primitive) {
         return Err(ExportError::Compressed { list: "mesh", index: mesh, extension: DRACO });
@@ -28,8 +36,10 @@ pub(super) fn prepare(
         .into_iter()
         .filter_map(|index| list.and_then(|list| list.get(index)))
         .any(uses_lightmap_set);
-    let moved = free_set(primitive).filter(|_| read);
-    for (attributes, _) in attribute_maps(primitive) {
+    let yields = old_set == OldSet::Yields;
+    let moved = free_set(primitive).filter(|_| read && yields);
+    let maps = if yields { attribute_maps(primitive) } else { Vec::new() };
+    for (attributes, _) in maps {
         let old = attributes.shift_remove(&set_name(LIGHTMAP_SET));
         match (old, moved) {
             (Some(accessor), Some(set)) => {

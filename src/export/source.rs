@@ -5,19 +5,23 @@
 //! at the end; instances whose tables of copies are equal share the result. Strips and fans become
 //! lists, since their corners cannot be split.
 //!
+//! A kept layout has one place for each vertex, so nothing is split there.
+//!
 //! Triangles of surfaces with several charts are cut along the charts' borders; what is new there is
 //! interpolated, see [`super::blend`].
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
 use serde_json::Value;
 
 use super::ExportError;
 use super::accessor::{self, Component};
 use super::blend::{Blend, Kind, blend};
 use super::document::{Document, Object, Target, index_of};
+use super::materials::LIGHTMAP_SET;
 use super::pool::{Charted, Choice, Pool};
-use super::primitive::{attribute_maps, insert_coordinates, prepare};
+use super::primitive::{OldSet, attribute_maps, insert_coordinates, prepare, set_name};
 use super::writer::Writer;
 use crate::scene::Placement;
 
@@ -55,12 +59,19 @@ pub(super) fn rewrite(
         let count = vertex_count(writer, &group)?;
         let (surface_of, cuts) = (&writer.plan.surface_of, &writer.plan.cuts);
         let charted = Charted { baked: writer.baked, surface_of, cuts, choice };
-        let pool = charted.pool(&group.placements, count)?;
+        let kept = kept_layout(writer, &group, count)?;
+        let pool = match &kept {
+            Some(kept) => charted.uncharted_pool(&group.placements, &kept.coordinates)?,
+            None => charted.pool(&group.placements, count)?,
+        };
         if pool.corners.iter().all(Vec::is_empty) {
             group.placements.iter().for_each(|p| primitives[p.primitive] = Value::Null);
             continue;
         }
-        let coordinates = writer.document.add_floats(pool.coordinates.as_flattened(), 2);
+        let kept = kept.and_then(|kept| kept.accessor);
+        let coordinates =
+            kept.unwrap_or_else(|| writer.document.add_floats(pool.coordinates.as_flattened(), 2));
+        let old_set = if kept.is_some() { OldSet::Stays } else { OldSet::Yields };
         for (placement, corners) in group.placements.iter().zip(&pool.corners) {
             if corners.is_empty() {
                 primitives[placement.primitive] = Value::Null;
@@ -68,7 +79,12 @@ pub(super) fn rewrite(
             }
             let primitive = primitives.get_mut(placement.primitive).and_then(Value::as_object_mut);
             let primitive = primitive.ok_or_else(|| not_there(placement))?;
-            prepare(&mut writer.document, &mut writer.materials, primitive, (placement.mesh, choice.page))?;
+            prepare(
+                &mut writer.document,
+                &mut writer.materials,
+                primitive,
+                (placement.mesh, choice.page, old_set),
+            )?;
             if !pool.unsplit {
                 for (attributes, target) in attribute_maps(primitive) {
                     for (name, value) in attributes {
@@ -112,6 +128,39 @@ fn group<'a>(placements: &[&'a Placement], primitives: &[Value]) -> Result<Vec<G
         }
     }
     Ok(groups)
+}
+
+/// A layout that the input brought.
+struct KeptLayout {
+    /// Where each vertex lies in its page, texture coordinates.
+    coordinates: Vec<[f32; 2]>,
+    /// The input's accessor, where it says so already.
+    accessor: Option<usize>,
+}
+
+/// The layout of a group of `count` vertices, if it is kept: the placements' own, where the atlas puts it.
+fn kept_layout(writer: &Writer, group: &Group, count: usize) -> Result<Option<KeptLayout>, ExportError> {
+    let baked = writer.baked;
+    let triangle = group.placements.first().and_then(|p| baked.scene.triangles.get(p.triangles.start));
+    let block = triangle.and_then(|triangle| baked.authored.block_of(triangle.placement as usize));
+    let Some(place) = block.and_then(|block| baked.atlas.blocks.get(block)) else { return Ok(None) };
+    let mismatch = || ExportError::Mismatch { what: "kept layouts" };
+    let attributes = group.attributes.as_ref();
+    let accessor = index_of(attributes.and_then(|attributes| attributes.get(set_name(LIGHTMAP_SET))));
+    let accessor = accessor.ok_or_else(mismatch)?;
+    let elements = accessor::read(writer.document.source, accessor, count)?;
+    let page_from_uv = place.page_from_uv(baked.atlas);
+    let place = |&[u, v]: &[f32; 2]| {
+        let Some(map) = page_from_uv else { return [u, v] };
+        let placed = map.transform_point2(DVec2::new(u.into(), v.into())).as_vec2();
+        // No triangle has those that are not finite.
+        if placed.is_finite() { placed.to_array() } else { [0.0; 2] }
+    };
+    let coordinates: Vec<[f32; 2]> = elements.floats().as_chunks().0.iter().map(place).collect();
+    if coordinates.len() != count {
+        return Err(mismatch());
+    }
+    Ok(Some(KeptLayout { coordinates, accessor: page_from_uv.is_none().then_some(accessor) }))
 }
 
 /// The group's number of vertices, the same in the scene and in the document.

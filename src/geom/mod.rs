@@ -9,3 +9,4 @@ pub mod triangle_grid;
 pub use bounds::Bounds;
 pub use frame::Frame;
 pub use polygon::Ring;
+pub use triangle_grid::TriangleGrid;

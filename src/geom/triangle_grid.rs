@@ -84,6 +84,11 @@ impl TriangleGrid {
         ((cell.x as usize).min(self.columns - 1), (cell.y as usize).min(self.rows - 1))
     }
 
+    /// The triangles of each bucket, ascending: two that share room share a bucket.
+    pub fn buckets(&self) -> impl Iterator<Item = &[u32]> {
+        self.starts.windows(2).map(|ends| &self.entries[ends[0] as usize..ends[1] as usize])
+    }
+
     /// The triangles that may contain `p`, in ascending order; those of the nearest bucket where `p` lies outside.
     #[must_use]
     pub fn candidates(&self, p: DVec2) -> &[u32] {

@@ -301,7 +301,7 @@ mod tests {
             chart(DVec2::new(0.5, 0.0), DVec2::ONE, DVec2::new(2.0, 2.0), DVec2::new(8.0, 1.0)),
         ];
         let pages = vec![PageArea { row: 0, width: 16, height: 16 }];
-        Atlas { width: 16, height: 16, pages, texels_per_metre: 8.0, gutter: 2, charts }
+        Atlas { width: 16, height: 16, pages, texels_per_metre: 8.0, gutter: 2, charts, blocks: vec![] }
     }
 
     /// The light in texels that belong to the charts `owned`, joined.

@@ -148,6 +148,8 @@ pub struct LightmapReport {
     pub png_bytes: u64,
     /// How well charts agree where they meet.
     pub seams: SeamReport,
+    /// Layouts of the input.
+    pub layouts: LayoutReport,
     /// Each page.
     pub pages: Vec<PageReport>,
 }
@@ -165,6 +167,17 @@ pub struct PageReport {
     pub bytes: u64,
     /// Size of the PNG, 0 where there is none.
     pub png_bytes: u64,
+}
+
+/// What became of the input's `TEXCOORD_1` where it was to be kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LayoutReport {
+    /// Lit nodes that keep theirs.
+    pub kept: u64,
+    /// Lit nodes that do not; `warnings` say why.
+    pub not_kept: u64,
+    /// Texels that lookups touch from two parts of kept layouts that do not go on in each other: light bleeds there.
+    pub shared_texels: u64,
 }
 
 /// How fine charts are, texels a metre: the geometric mean of the density along either axis.

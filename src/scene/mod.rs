@@ -47,6 +47,7 @@ pub use load::{ImportOptions, from_bytes, load};
 pub use settings::NodeSettings;
 pub use uri::UriError;
 pub(crate) use uri::percent_decode;
+pub(crate) use warning::Warnings;
 
 use std::ops::Range;
 
@@ -80,6 +81,24 @@ pub struct Scene {
     pub source: SourceDocument,
     /// What the user should know, one sentence each.
     pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// A triangle's corners, metres; the origin for those that are not there.
+    #[must_use]
+    pub fn corners(&self, triangle: &Triangle) -> [DVec3; 3] {
+        triangle.vertices.map(|v| self.vertices.get(v as usize).copied().unwrap_or_default())
+    }
+
+    /// How messages name the `index`-th entry of one of the document's lists, whose singular is `kind`.
+    pub(crate) fn item(&self, kind: &'static str, index: usize) -> Item {
+        let list = match kind {
+            "mesh" => "meshes".to_owned(),
+            _ => format!("{kind}s"),
+        };
+        let name = self.source.json.get(list).and_then(|list| list.get(index)?.get("name")?.as_str());
+        Item::new(kind, index, name)
+    }
 }
 
 /// One placed triangle.

@@ -7,7 +7,7 @@ const NAMED: usize = 4;
 
 /// Collects warnings by their text, in the order in which each text first came up.
 #[derive(Debug, Default)]
-pub(super) struct Warnings {
+pub(crate) struct Warnings {
     groups: Vec<Group>,
 }
 
@@ -20,7 +20,7 @@ struct Group {
 
 impl Warnings {
     /// Notes that `text` holds for `subject`.
-    pub(super) fn about(&mut self, subject: impl Display, text: impl Into<String>) {
+    pub(crate) fn about(&mut self, subject: impl Display, text: impl Into<String>) {
         let text = text.into();
         let group = match self.groups.iter_mut().position(|group| group.text == text) {
             Some(index) => self.groups.get_mut(index),
@@ -44,7 +44,7 @@ impl Warnings {
     }
 
     /// One sentence for each text.
-    pub(super) fn into_sentences(self) -> Vec<String> {
+    pub(crate) fn into_sentences(self) -> Vec<String> {
         self.groups.into_iter().map(Group::into_sentence).collect()
     }
 }

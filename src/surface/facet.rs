@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::Geometry;
 use super::weld::{position_noise, weld};
@@ -28,6 +28,8 @@ pub(super) struct Facet {
     pub(super) area: f64,
     /// The least height, metres.
     pub(super) height: f64,
+    /// The corners' texture coordinates where they are kept.
+    pub(super) coordinates: Option<[DVec2; 3]>,
 }
 
 /// The facets of one placement, or of some of it.
@@ -71,7 +73,8 @@ impl Facets {
             let welded = own.map(|v| first[v as usize]);
             let distinct = welded[0] != welded[1] && welded[1] != welded[2] && welded[2] != welded[0];
             let ring = if distinct { welded } else { own }.to_vec();
-            facets.extend(facet(index, ring, points, noise));
+            let coordinates = geometry.coordinates.get(index).copied().flatten();
+            facets.extend(facet(index, ring, points, noise).map(|f| Facet { coordinates, ..f }));
         }
         let mut facets = Self { positions, facets, noise };
         facets.cut_edges(bounds);
@@ -140,7 +143,7 @@ fn facet(triangle: usize, ring: Vec<u32>, points: [DVec3; 3], noise: f64) -> Opt
     let thin = height <= THINNEST * longest || (height <= noise && height <= 1e-3 * longest);
     let area = height * longest / 2.0;
     let usable = normal.is_finite() && area > 0.0 && !thin;
-    usable.then_some(Facet { triangle, ring, points, normal, area, height })
+    usable.then_some(Facet { triangle, ring, points, normal, area, height, coordinates: None })
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -3,13 +3,15 @@
 //! A group grows from its largest facet across shared edges. Each further facet is measured against
 //! the plane of all before it, never against its neighbour's, so a finely tessellated cylinder, whose
 //! neighbours differ by less than any tolerance, still falls apart. The tolerances follow what the
-//! positions are exact to: a thin facet's normal says less than a wide one's.
+//! positions are exact to: a thin facet's normal says less than a wide one's. Where texture coordinates are kept,
+//! a group ends where their map changes.
 
 use std::collections::VecDeque;
 
 use glam::{DVec2, DVec3};
 
 use super::facet::{Facet, Facets};
+use super::layout::FacetLayout;
 use crate::geom::{Frame, polygon};
 
 /// Facets whose normals differ by more than this are not coplanar, radians; what noise adds comes on top.
@@ -95,6 +97,7 @@ impl<'a> Growth<'a> {
         let mut members = Vec::new();
         let mut queue = VecDeque::new();
         let mut covered = Covered::by(&facets.facets[seed], facets.noise);
+        let layout = FacetLayout::of(&facets.facets[seed]);
         self.add(seed, group);
         queue.push_back(seed);
         while let Some(current) = queue.pop_front() {
@@ -107,6 +110,7 @@ impl<'a> Growth<'a> {
                     at += 1;
                     if self.group_of[edge.facet].is_none()
                         && plane.holds(&facets.facets[edge.facet])
+                        && layout.as_ref().is_none_or(|layout| layout.goes_on(&facets.facets[edge.facet]))
                         && self.is_free(edge.facet, group)
                         && (self.apart == Apart::Edges || covered.add(&facets.facets[edge.facet]))
                     {

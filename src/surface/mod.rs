@@ -11,6 +11,7 @@ mod contact;
 mod dangling;
 mod facet;
 mod group;
+mod layout;
 mod outline;
 mod region;
 mod weld;
@@ -34,6 +35,9 @@ pub struct Geometry<'a> {
     pub placements: &'a [Placement],
     /// For each material whether both sides reflect.
     pub double_sided: Vec<bool>,
+    /// Texture coordinates of the triangles that keep their own: surfaces go on only where these do. Empty where no
+    /// triangle does.
+    pub coordinates: &'a [Option<[DVec2; 3]>],
 }
 
 impl<'a> From<&'a Scene> for Geometry<'a> {
@@ -43,6 +47,7 @@ impl<'a> From<&'a Scene> for Geometry<'a> {
             triangles: &scene.triangles,
             placements: &scene.placements,
             double_sided: scene.materials.iter().map(|m| m.double_sided).collect(),
+            coordinates: &[],
         }
     }
 }

@@ -29,6 +29,7 @@ impl Layout {
             texels_per_metre: self.texels_per_metre * if mean_weight.is_finite() { mean_weight } else { 1.0 },
             gutter: page.gutter.gap,
             charts: sized.iter().zip(&self.places).map(|(chart, &place)| chart.chart(place)).collect(),
+            blocks: Vec::new(),
         })
     }
 }

@@ -13,9 +13,11 @@
 //! the charts' density is given, the page becomes as small as they allow (`least`).
 
 mod bit_grid;
+mod block;
 mod error;
 mod fill;
 pub(crate) mod footprint;
+mod islands;
 mod layout;
 mod least;
 mod max_rects;
@@ -26,7 +28,9 @@ mod shape;
 #[cfg(feature = "xatlas")]
 mod xatlas;
 
+pub use block::{Block, Member, blocks};
 pub use error::UnwrapError;
+pub use islands::shared_texels;
 pub use part::{Part, whole};
 pub(crate) use part::{area_within, clip};
 
@@ -58,8 +62,33 @@ pub struct Atlas {
     pub texels_per_metre: f64,
     /// Free texels kept between what bilinear lookups of two charts touch; none at the page's edge.
     pub gutter: u32,
-    /// Surface by surface, at least one for each.
+    /// Surface by surface, at least one for each that gets a lightmap.
     pub charts: Vec<Chart>,
+    /// Where each [`Block`] lies.
+    pub blocks: Vec<BlockPlace>,
+}
+
+/// A block's place in the sheet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockPlace {
+    /// Index into the atlas's pages.
+    pub page: usize,
+    /// Takes the layout's coordinates to texels of the sheet.
+    pub texel_from_uv: DAffine2,
+}
+
+impl BlockPlace {
+    /// What takes the layout's coordinates to those of its page, `[0, 1]`; `None` where that changes nothing.
+    #[must_use]
+    pub fn page_from_uv(&self, atlas: &Atlas) -> Option<DAffine2> {
+        let page = atlas.pages.get(self.page)?;
+        let size = DVec2::new(page.width.into(), page.height.into());
+        if self.texel_from_uv == DAffine2::from_scale(size) {
+            return None;
+        }
+        let shift = DAffine2::from_translation(DVec2::new(0.0, -f64::from(page.row)));
+        Some(DAffine2::from_scale(1.0 / size) * shift * self.texel_from_uv)
+    }
 }
 
 impl Atlas {
@@ -185,30 +214,50 @@ impl UnwrapOptions {
 /// [`UnwrapError::TooSmall`] if the charts do not fit even with one texel each,
 /// [`UnwrapError::TooLarge`] if the density asked for needs a page above 16384 texels.
 pub fn unwrap(surfaces: &[Surface], parts: &[Part], options: &UnwrapOptions) -> Result<Atlas, UnwrapError> {
-    unwrap_groups(surfaces, parts, &|surface| surface.placement, options)
+    unwrap_groups(surfaces, (&[], parts), &|surface| surface.placement, options)
 }
 
-/// As [`unwrap`]; surfaces of one `group` share a page where they can.
+/// As [`unwrap`], with blocks of other surfaces beside the parts; surfaces of one `group` share a page where they can.
+/// A block that is alone has the page to itself: its layout's unit square is the page.
 ///
 /// # Errors
 /// As [`unwrap`].
 pub fn unwrap_groups(
     surfaces: &[Surface],
-    parts: &[Part],
+    (blocks, parts): (&[Block], &[Part]),
     group: &dyn Fn(&Surface) -> usize,
     options: &UnwrapOptions,
 ) -> Result<Atlas, UnwrapError> {
-    let shapes: Vec<_> = parts.iter().map(|part| Shape::of(part, &surfaces[part.surface])).collect();
-    let groups: Vec<usize> = parts.iter().map(|part| group(&surfaces[part.surface])).collect();
+    if let ([block], []) = (blocks, parts) {
+        return block.page(surfaces, options, gutter(options.padding, options.mips));
+    }
+    let own = parts.iter().map(|part| Shape::of(part, &surfaces[part.surface]));
+    let shapes: Vec<_> = blocks.iter().map(|block| block.shape(surfaces)).chain(own).collect();
+    let first = |block: &Block| block.members.first().map_or(0, |member| member.surface);
+    let firsts = blocks.iter().map(first).chain(parts.iter().map(|part| part.surface));
+    let groups: Vec<usize> = firsts.map(|surface| surfaces.get(surface).map_or(0, group)).collect();
     let lay_out = |gutter| match options.pages {
         0 | 1 => lay_out(&shapes, options, gutter),
         _ => lay_out_on_pages(&shapes, &groups, options, gutter),
     };
     let atlas = lay_out(gutter(options.padding, options.mips));
-    match (&atlas, options.padding) {
+    let atlas = match (&atlas, options.padding) {
         (Err(_), None) => lay_out(Gutter::new(0, options.mips)).or(atlas),
         _ => atlas,
+    };
+    atlas.map(|atlas| opened(atlas, blocks, surfaces))
+}
+
+/// The atlas with the charts of the blocks' surfaces in place of the blocks' own, which come first.
+fn opened(mut atlas: Atlas, blocks: &[Block], surfaces: &[Surface]) -> Atlas {
+    for (block, chart) in blocks.iter().zip(atlas.charts.drain(..blocks.len()).collect::<Vec<_>>()) {
+        let (place, charts) = block.charts(surfaces, &chart);
+        atlas.blocks.push(place);
+        atlas.charts.extend(charts);
     }
+    // The sort is stable.
+    atlas.charts.sort_by_key(|chart| chart.surface);
+    atlas
 }
 
 /// Refuses square pages of this side if so many charts cannot fit, however small they are and whatever lies between:

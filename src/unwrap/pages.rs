@@ -160,6 +160,7 @@ fn sheet(atlases: Vec<Atlas>, (shapes, division): (&[Shape], &[Vec<usize>]), gut
         gutter: gutter.gap,
         pages: vec![],
         charts: vec![],
+        blocks: vec![],
     };
     let (mut charts, mut squares, mut area) = (Vec::new(), 0.0, 0.0);
     for (page, (atlas, list)) in atlases.into_iter().zip(division).enumerate() {

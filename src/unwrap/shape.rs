@@ -36,6 +36,15 @@ impl Shape {
                 (2..ring.len()).map(move |k| [ring[0], ring[k - 1], ring[k]]).collect::<Vec<_>>()
             })
             .collect();
+        Self {
+            surface: part.surface,
+            outline: part.outline.clone(),
+            ..Self::of_triangles(triangles, part.weight)
+        }
+    }
+
+    /// The shape of triangles in a plane. Without finite extent they become a point, which gets a chart of one texel.
+    pub(super) fn of_triangles(triangles: Vec<[DVec2; 3]>, weight: DVec2) -> Self {
         let corners = triangles.iter().flatten();
         let (low, high) =
             corners.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
@@ -46,9 +55,9 @@ impl Shape {
             extent: DVec2::ZERO,
             triangles: Vec::new(),
             area: 0.0,
-            weight: part.weight,
-            surface: part.surface,
-            outline: part.outline.clone(),
+            weight,
+            surface: 0,
+            outline: Ring::new(),
         };
         if extent.is_finite() && extent.cmpge(DVec2::ZERO).all() {
             Self { corner: low, extent, triangles, area, ..point }

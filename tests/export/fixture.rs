@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use cobake::authored::Authored;
 use cobake::export::{Baked, encode_png};
 use cobake::geom::Frame;
 use cobake::geom::polygon::rectangle;
@@ -177,6 +178,7 @@ pub(crate) struct Results {
     pub(crate) atlas: Atlas,
     pub(crate) lightmap: Lightmap,
     pub(crate) mesh: RadiosityMesh,
+    pub(crate) authored: Authored,
     pub(crate) options: BakeOptions,
 }
 
@@ -210,11 +212,20 @@ impl Results {
             texels_per_metre: 8.0,
             gutter: 2,
             charts: charts.collect(),
+            blocks: Vec::new(),
         };
         let texel = |i: u32| [(i % side) as f32 / 16.0, (i / side) as f32 / 64.0, 0.5];
         let lightmap = Lightmap { width: side, height: side, texels: (0..side * side).map(texel).collect() };
         let mesh = RadiosityMesh { surfaces: surfaces.iter().map(fan).collect() };
-        Self { scene, surfaces, atlas, lightmap, mesh, options: BakeOptions::default() }
+        Self {
+            scene,
+            surfaces,
+            atlas,
+            lightmap,
+            mesh,
+            authored: Authored::default(),
+            options: BakeOptions::default(),
+        }
     }
 
     pub(crate) fn baked(&self) -> Baked<'_> {
@@ -226,6 +237,7 @@ impl Results {
             preview: None,
             mesh: &self.mesh,
             facets: &[],
+            authored: &self.authored,
             options: &self.options,
         }
     }
