@@ -47,6 +47,20 @@ pub enum Dynamic {
     Cast,
 }
 
+/// What surfaces that are drawn with interpolated normals are lit about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Normals {
+    /// Their triangles' own normals: a coarse sphere has facets.
+    #[default]
+    Geometric,
+    /// The interpolated normals, from where the curved surface is that these tell of (Hanika 2021): a coarse sphere is
+    /// round, and its facets throw no shadows on themselves. What passes between surfaces still is what triangles
+    /// send to triangles.
+    Shading,
+}
+
 /// What the output's geometry is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -206,6 +220,8 @@ pub struct BakeOptions {
     pub elements: Toggle,
     /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
     pub dynamic: Dynamic,
+    /// What curved surfaces are lit about. Default: [`Normals::Geometric`].
+    pub normals: Normals,
 }
 
 /// A choice between on and off that reads as a word.
@@ -245,6 +261,7 @@ impl Default for BakeOptions {
             scene: None,
             elements: Toggle::Off,
             dynamic: Dynamic::default(),
+            normals: Normals::default(),
         }
     }
 }
