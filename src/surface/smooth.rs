@@ -186,3 +186,55 @@ fn is_convex(triangle: &[Corner; 3]) -> bool {
     let is_behind = |c: &Corner, p: DVec2| c.depth(p) >= -CONCAVE * c.place.distance(p);
     triangle.iter().all(|c| triangle.iter().all(|other| is_behind(c, other.place)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle in the plane `z = 0` with normals that turn away from its middle, as on a sphere.
+    fn convex() -> (Frame, SmoothNormals) {
+        let frame = Frame::new(DVec3::ZERO, DVec3::Z, DVec3::X);
+        let corner = |(x, y): (f64, f64)| {
+            Corner::new(&frame, DVec2::new(x, y), DVec3::new(0.3 * x, 0.3 * y, 1.0).normalize())
+        };
+        let triangle = [(-1.0, -0.6), (1.0, -0.6), (0.0, 1.2)].map(corner);
+        assert!(is_convex(&triangle));
+        (frame, SmoothNormals::new(&frame, vec![triangle], vec![7]))
+    }
+
+    /// The curved surface goes through the corners and bulges between them, and the slab holds it.
+    #[test]
+    fn places_are_lifted_onto_the_curved_surface() {
+        let (frame, smooth) = convex();
+        let corner = smooth.at(DVec2::new(1.0, -0.6));
+        assert!(corner.offset.length() < 1e-12);
+        assert!((corner.normal - DVec3::new(0.3, -0.18, 1.0).normalize()).length() < 1e-12);
+        let middle = smooth.at(DVec2::ZERO);
+        assert!(middle.offset.z > 0.1 && (middle.normal - DVec3::Z).length() < 0.05, "{middle:?}");
+        let triangle = smooth.triangles[0].map(|c| c.place);
+        let slab = smooth.slab(&frame, &triangle);
+        let bounds = crate::geom::Bounds::of(slab.corners().iter().copied());
+        for k in 0..100 {
+            let (u, v) = (f64::from(k % 10) / 9.0, f64::from(k / 10) / 9.0);
+            let p = triangle[0].lerp(triangle[1], u).lerp(triangle[2], v);
+            let (lifted, _) = smooth.at(p).above(frame.lift(p));
+            assert!(bounds.grown(1e-12).distance(lifted) == 0.0, "{lifted} outside of {bounds:?}");
+        }
+    }
+
+    /// From behind the same triangle is hollow: it is not lifted, and shades itself.
+    #[test]
+    fn the_back_is_hollow() {
+        let (frame, smooth) = convex();
+        let back = smooth.flipped(&frame.flipped());
+        let p = DVec2::new(0.2, 0.1);
+        let place = back.at(DVec2::new(p.x, -p.y));
+        assert!((place.normal + smooth.at(p).normal).length() < 1e-12);
+        assert!(place.offset.length() < 1e-12);
+        let mut occluders = vec![3, 7, 9];
+        back.leave_out_own(&mut occluders);
+        assert_eq!(occluders, [3, 7, 9]);
+        smooth.leave_out_own(&mut occluders);
+        assert_eq!(occluders, [3, 9]);
+    }
+}
