@@ -8,7 +8,7 @@ use crate::authored::Authored;
 use crate::element::{Facet, MeshOptions, SceneAppearance, build};
 use crate::error::Error;
 use crate::export::{Baked, encode};
-use crate::options::{BakeOptions, DensityPolicy, Resolution, Toggle};
+use crate::options::{BakeOptions, DensityPolicy, Normals, Resolution, Toggle};
 use crate::progress::{Progress, Stage};
 use crate::raster::{Lighting, Lightmap, RasterInput};
 use crate::report::{Recorder, Report};
@@ -72,13 +72,14 @@ pub fn bake(path: &Path, options: &BakeOptions, progress: &mut dyn Progress) -> 
     pool.install(|| {
         let mut recorder = Recorder::new(progress);
         recorder.begin(Stage::Import);
-        let scene =
-            crate::scene::load(path, &ImportOptions { scene: options.scene, dynamic: options.dynamic })?;
+        let BakeOptions { scene, dynamic, normals, .. } = *options;
+        let scene = crate::scene::load(path, &ImportOptions { scene, dynamic, normals })?;
         run(&scene, options, recorder)
     })
 }
 
-/// Bakes a scene that was [loaded](crate::scene::load) before. See [`bake`].
+/// Bakes a scene that was [loaded](crate::scene::load) before, for [`Normals::Shading`] with its
+/// [normals](ImportOptions::normals). See [`bake`].
 ///
 /// # Errors
 /// As [`bake`]. Runs in the caller's rayon thread pool; `options.threads` has no effect.
@@ -96,7 +97,10 @@ fn run(scene: &Scene, options: &BakeOptions, mut recorder: Recorder) -> Result<B
     enter(&mut recorder, Stage::Surfaces)?;
     let tracer = tracer(scene);
     let authored = authored(scene, options, &mut recorder)?;
-    let geometry = Geometry { coordinates: authored.coordinates(), ..Geometry::from(scene) };
+    let mut geometry = Geometry { coordinates: authored.coordinates(), ..Geometry::from(scene) };
+    if options.normals == Normals::Geometric {
+        geometry.normals = &[];
+    }
     let set = build_surfaces(&geometry, &tracer);
     account::warn_of_surfaces(&set, &mut recorder);
     account::warn_of_reflectance(scene, options, &mut recorder);

@@ -47,6 +47,20 @@ pub enum Dynamic {
     Cast,
 }
 
+/// What surfaces that are drawn with interpolated normals are lit about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Normals {
+    /// Their triangles' own normals: a coarse sphere has facets.
+    #[default]
+    Geometric,
+    /// The interpolated normals, from where the curved surface is that these tell of (Hanika 2021): a coarse sphere is
+    /// round, and its facets throw no shadows on themselves. What passes between surfaces still is what triangles
+    /// send to triangles.
+    Shading,
+}
+
 /// What the output's geometry is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -209,6 +223,8 @@ pub struct BakeOptions {
     /// Whether a `TEXCOORD_1` that is a lightmap layout is kept and used; a warning says which are none, and why. With
     /// one that is, [`DensityPolicy::Uniform`] holds for all the rest; goes with no [`mips`](Self::mips). Default: no.
     pub keep_uv1: Toggle,
+    /// What curved surfaces are lit about. Default: [`Normals::Geometric`].
+    pub normals: Normals,
 }
 
 /// A choice between on and off that reads as a word.
@@ -249,6 +265,7 @@ impl Default for BakeOptions {
             elements: Toggle::Off,
             dynamic: Dynamic::default(),
             keep_uv1: Toggle::Off,
+            normals: Normals::default(),
         }
     }
 }

@@ -43,6 +43,7 @@ fn surface(ring: Vec<DVec2>, regions: Vec<Region>) -> Surface {
         rings: vec![ring],
         source_triangles: Vec::new(),
         regions,
+        smooth: None,
         double_sided: false,
     }
 }

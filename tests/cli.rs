@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 35] = [
+const OPTIONS: [&str; 36] = [
     "--pages",
     "--separate",
     "--for",
@@ -26,6 +26,7 @@ const OPTIONS: [&str; 35] = [
     "--size",
     "--texels-per-metre",
     "--dynamic",
+    "--normals",
     "--elements",
     "--threads",
     "--report",

@@ -58,6 +58,7 @@ impl Model {
 
     fn build(&self) -> SurfaceSet {
         let geometry = Geometry {
+            normals: &[],
             vertices: &self.vertices,
             triangles: &self.triangles,
             placements: &self.placements,
@@ -236,6 +237,7 @@ fn a_fine_cylinder_does_not_become_one_surface() {
     let mut model = Model::default();
     model.add(&strip);
     let geometry = Geometry {
+        normals: &[],
         vertices: &model.vertices,
         triangles: &model.triangles,
         placements: &model.placements,

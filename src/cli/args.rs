@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cobake::options::{
-    BakeOptions, CobHeight, DensityPolicy, Direct, Dynamic, Preview, Quantity, Refine, Resolution, Toggle,
-    Topology,
+    BakeOptions, CobHeight, DensityPolicy, Direct, Dynamic, Normals, Preview, Quantity, Refine, Resolution,
+    Toggle, Topology,
 };
 
 use super::bytes;
@@ -82,6 +82,10 @@ pub(crate) struct BakeArgs {
     /// What becomes of meshes that move by animation, skin or morph targets; none gets a lightmap
     #[arg(long, value_enum, default_value_t = DynamicWord::Ignore)]
     dynamic: DynamicWord,
+
+    /// What surfaces that are drawn with interpolated normals are lit about: their triangles' normals or these
+    #[arg(long, value_enum, default_value_t = NormalsWord::Geometric)]
+    normals: NormalsWord,
 
     /// Worker threads, 0 to 1024; 0 takes one per core. The result does not depend on it
     #[arg(long, value_name = "N", default_value_t = BakeOptions::default().threads)]
@@ -230,6 +234,14 @@ enum DynamicWord {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
+enum NormalsWord {
+    /// The triangles' own: a coarse sphere has facets
+    Geometric,
+    /// The interpolated ones: it is round, and no facet shades itself
+    Shading,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum TopologyWord {
     /// The input's own triangles with a second set of texture coordinates
     Source,
@@ -303,6 +315,15 @@ impl From<DynamicWord> for Dynamic {
     }
 }
 
+impl From<NormalsWord> for Normals {
+    fn from(word: NormalsWord) -> Self {
+        match word {
+            NormalsWord::Geometric => Self::Geometric,
+            NormalsWord::Shading => Self::Shading,
+        }
+    }
+}
+
 impl From<TopologyWord> for Topology {
     fn from(word: TopologyWord) -> Self {
         match word {
@@ -372,6 +393,7 @@ impl From<&BakeArgs> for BakeOptions {
         options.elements = if args.elements { Toggle::On } else { Toggle::Off };
         options.dynamic = args.dynamic.into();
         options.keep_uv1 = if args.keep_uv1 { Toggle::On } else { Toggle::Off };
+        options.normals = args.normals.into();
         options
     }
 }
@@ -405,7 +427,7 @@ mod tests {
         let typed = options(
             "--size 64 --threads 3 --refine uniform --direct mesh --topology adaptive --quantity radiosity \
              --cob-height 0.5 --subdivision-threshold 0.01 --illumination-threshold 0.2 --no-shaft-test \
-             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --pages 5 --scene 1 --dynamic cast --elements --keep-uv1",
+             --no-umbra-test --unshot-fraction 0.01 --gather-error 0.02 --max-reflectance 0.9 --padding 2 --mips 3 --pages 5 --scene 1 --dynamic cast --normals shading --elements --keep-uv1",
         );
         let mut meant = BakeOptions::default();
         meant.resolution = Resolution::Size(64);
@@ -427,6 +449,7 @@ mod tests {
         meant.pages = 5;
         meant.scene = Some(1);
         meant.dynamic = Dynamic::Cast;
+        meant.normals = Normals::Shading;
         meant.elements = Toggle::On;
         meant.keep_uv1 = Toggle::On;
         assert_eq!(typed, meant);

@@ -1,6 +1,7 @@
 //! Laying out facets and splitting their elements.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
@@ -46,6 +47,8 @@ pub trait SurfaceAppearance {
 pub fn build(surfaces: &[Surface], appearance: &dyn SurfaceAppearance, options: MeshOptions) -> Vec<Facet> {
     let mut facets = Vec::new();
     for (index, surface) in surfaces.iter().enumerate() {
+        let back = || surface.smooth.as_ref().map(|s| Arc::new(s.flipped(&surface.frame.flipped())));
+        let smooth_back = surface.double_sided.then(back).flatten();
         for (region_index, region) in surface.regions.iter().enumerate() {
             for (min, max) in tiles(&region.rings, options.patch_size) {
                 let rings = clip_rings(&region.rings, min, max);
@@ -55,6 +58,10 @@ pub fn build(surfaces: &[Surface], appearance: &dyn SurfaceAppearance, options: 
                 let sides: &[Side] =
                     if surface.double_sided { &[Side::Front, Side::Back] } else { &[Side::Front] };
                 for &side in sides {
+                    let smooth = match side {
+                        Side::Front => surface.smooth.clone(),
+                        Side::Back => smooth_back.clone(),
+                    };
                     let (frame, rings) = seen_from(side, surface.frame, &rings);
                     let triangles: Vec<Ring> = region.triangles.iter().map(|t| t.to_vec()).collect();
                     let (_, parts) = seen_from(side, surface.frame, &clip_rings(&triangles, min, max));
@@ -64,6 +71,7 @@ pub fn build(surfaces: &[Surface], appearance: &dyn SurfaceAppearance, options: 
                         region: region_index,
                         side,
                         frame,
+                        smooth,
                         rings,
                         parts,
                         exitance,

@@ -1,13 +1,15 @@
 //! Facets: one side of a tile of a region, with its elements and samples.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
 use super::{Element, NONE, Shading};
 use crate::cob::CobLists;
-use crate::geom::{Frame, Ring};
+use crate::geom::{Frame, Ring, Slab};
 use crate::solve::form_factor::SurfacePoint;
+use crate::surface::SmoothNormals;
 
 /// A side of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +41,8 @@ pub struct Facet {
     /// Plane coordinates; the normal points to the side that receives. On the back, `y` runs the other way
     /// than in the surface's frame.
     pub frame: Frame,
+    /// The normals that light is received about, as seen from this side; `None` where these are the plane's.
+    pub smooth: Option<Arc<SmoothNormals>>,
     /// The outline inside this tile.
     pub rings: Vec<Ring>,
     /// The same area as convex polygons.
@@ -71,10 +75,23 @@ impl Facet {
     /// The element's outline hull in world space, counter-clockwise seen from the receiving side.
     #[must_use]
     pub fn hull(&self, element: u32) -> Vec<DVec3> {
+        self.plane_hull(element).iter().map(|&p| self.frame.lift(p)).collect()
+    }
+
+    fn plane_hull(&self, element: u32) -> Vec<DVec2> {
         let e = &self.elements[element as usize];
         match &e.cut {
-            Some(cut) if cut.hull.len() >= 3 => cut.hull.iter().map(|&p| self.frame.lift(p)).collect(),
-            _ => e.corners().map(|p| self.frame.lift(p)).to_vec(),
+            Some(cut) if cut.hull.len() >= 3 => cut.hull.clone(),
+            _ => e.corners().to_vec(),
+        }
+    }
+
+    /// What holds all places where the element receives light.
+    #[must_use]
+    pub fn slab(&self, element: u32) -> Slab {
+        match &self.smooth {
+            None => Slab::flat(self.hull(element)),
+            Some(smooth) => smooth.slab(&self.frame, &self.plane_hull(element)),
         }
     }
 
@@ -103,8 +120,12 @@ impl Facet {
     /// A place of the facet as a receiving point.
     #[must_use]
     pub fn receiving(&self, p: DVec2) -> SurfacePoint {
-        let position = self.frame.lift(p);
-        SurfacePoint { position: position + self.frame.normal * self.lift, normal: self.frame.normal }
+        let foot = self.frame.lift(p);
+        let (position, normal) = match &self.smooth {
+            None => (foot, self.frame.normal),
+            Some(smooth) => smooth.at(p).above(foot),
+        };
+        SurfacePoint { position: position + normal * self.lift, normal }
     }
 
     /// The leaf at `p`, or the nearest one inside the facet's rectangle.

@@ -5,7 +5,6 @@ use glam::{DMat3, DVec2, DVec3};
 use super::facet::{Facet, Sample};
 use crate::geom::Ring;
 use crate::geom::polygon::{contains, nearest_on_segment};
-use crate::solve::form_factor::SurfacePoint;
 
 /// Keeps the fitted plane level where the samples lie too close together to tell its slope;
 /// in squares of the element's side.
@@ -41,10 +40,7 @@ impl Facet {
     }
 
     fn add_sample(&mut self, position: DVec2) -> u32 {
-        let point = SurfacePoint {
-            position: self.frame.lift(position) + self.frame.normal * self.lift,
-            normal: self.frame.normal,
-        };
+        let point = self.receiving(position);
         self.samples.push(Sample { position, point });
         (self.samples.len() - 1) as u32
     }

@@ -18,7 +18,7 @@ use super::penumbra::{SmoothBlock, is_soft};
 use super::shadowing::{Shadowing, Standing};
 use super::ways::TexelWays;
 use crate::geom::polygon::rectangle;
-use crate::geom::{Bounds, Frame, Ring};
+use crate::geom::{Bounds, Ring, Slab};
 use crate::solve::emitter::{Between, Effort, Emitter, Evaluation, Precision};
 use crate::solve::form_factor::SurfacePoint;
 use crate::solve::umbra::Occluders;
@@ -240,23 +240,23 @@ impl Shining<'_> {
         if texels.is_empty() {
             return Done::default();
         }
-        let hull = self.block(extent);
-        if self.emitter.is_behind(&hull, self.surface.frame.normal, self.light.tracer.margin()) {
-            return self.shine_past(texels, extent, &hull, &Standing::Behind);
+        let block = self.block(extent);
+        if self.is_behind(&block) {
+            return self.shine_past(texels, extent, &block, &Standing::Behind);
         }
         // A block that is not much smaller than the one before has about the same shaft.
         if texels.len() > self.light.edges.small_block().max(inherited.texels / BLOCKS_A_SHAFT) {
             return self.halve(texels, extent, inherited);
         }
-        let standing = self.standing_before(&hull, inherited.between);
-        self.shine_past(texels, extent, &hull, &standing)
+        let standing = self.standing_before(&block, inherited.between);
+        self.shine_past(texels, extent, &block, &standing)
     }
 
     fn shine_past(
         &self,
         texels: &mut [LitTexel],
         extent: (DVec2, DVec2),
-        hull: &[DVec3; 4],
+        whole: &Slab,
         standing: &Standing,
     ) -> Done {
         let count = texels.len() as u64;
@@ -280,7 +280,7 @@ impl Shining<'_> {
             return self.shadow_edge(texels, &self.light.occluders.polygons(self.light.tracer, between));
         }
         if SMOOTH_BLOCKS.contains(&texels.len())
-            && let Some(done) = self.smooth_penumbra(texels, extent, hull, between)
+            && let Some(done) = self.smooth_penumbra(texels, extent, whole.corners(), between)
         {
             return done;
         }
@@ -312,14 +312,17 @@ impl Shining<'_> {
         done.and(other)
     }
 
-    /// The corners in space of the block that texels with points in this extent cover.
-    fn block(&self, (min, max): (DVec2, DVec2)) -> [DVec3; 4] {
+    /// The block in space that texels with points in this extent cover.
+    fn block(&self, (min, max): (DVec2, DVec2)) -> Slab {
         let reach = 0.5 * (self.cover.step[0].abs() + self.cover.step[1].abs());
         let least = DVec2::splat(self.light.tracer.margin());
         let (low, high) = self.surface.extent();
         let (min, max) = ((min - reach).max(low) - least, (max + reach).min(high) + least);
-        let frame: &Frame = &self.surface.frame;
-        rectangle(min, max).map(|p| frame.lift(p))
+        let Surface { frame, smooth, .. } = self.surface;
+        match smooth {
+            None => Slab::flat(rectangle(min, max).map(|p| frame.lift(p)).to_vec()),
+            Some(smooth) => smooth.slab(frame, &rectangle(min, max)),
+        }
     }
 
     /// A block that nothing shades.
@@ -336,13 +339,14 @@ impl Shining<'_> {
         &self,
         texels: &mut [LitTexel],
         extent: (DVec2, DVec2),
-        hull: &[DVec3; 4],
+        corners: &[DVec3],
         between: &[u32],
     ) -> Option<Done> {
         let occluders = self.light.occluders.polygons(self.light.tracer, between);
-        let is_faint = self.emitter.at_most(Bounds::of(*hull), self.light.tracer.diagonal())
-            < FAINT * self.light.typical / self.light.emitters.len() as f64;
-        if !is_faint && !is_soft(hull, self.emitter, &occluders, self.light.tracer.diagonal()) {
+        let is_faint =
+            self.emitter.at_most(Bounds::of(corners.iter().copied()), self.light.tracer.diagonal())
+                < FAINT * self.light.typical / self.light.emitters.len() as f64;
+        if !is_faint && !is_soft(corners, self.emitter, &occluders, self.light.tracer.diagonal()) {
             return None;
         }
         let mut evaluation = Evaluation::new(Precision::EMITTER);
@@ -354,9 +358,13 @@ impl Shining<'_> {
     }
 
     pub(super) fn irradiance(&self, point: DVec2, between: Between, evaluation: &mut Evaluation) -> DVec3 {
-        let frame = &self.surface.frame;
-        let position = frame.lift(point) + frame.normal * self.light.tracer.margin();
-        let receiver = SurfacePoint { position, normal: frame.normal };
+        let Surface { frame, smooth, .. } = self.surface;
+        let foot = frame.lift(point);
+        let (position, normal) = match smooth {
+            None => (foot, frame.normal),
+            Some(smooth) => smooth.at(point).above(foot),
+        };
+        let receiver = SurfacePoint { position: position + normal * self.light.tracer.margin(), normal };
         self.emitter.irradiance(receiver, self.light.tracer, between, evaluation)
     }
 }

@@ -23,10 +23,10 @@ const DIM: f64 = 0.5;
 /// The centre may differ by this fraction from the mean of the corners before more is looked at.
 const LIKELY: f64 = 0.2;
 
-/// Whether the shadows of all `occluders` are wide against the block with corners `hull`.
-pub(super) fn is_soft(hull: &[DVec3; 4], emitter: &Emitter, occluders: &[Occluder], diagonal: f64) -> bool {
+/// Whether the shadows of all `occluders` are wide against the block with these corners.
+pub(super) fn is_soft(corners: &[DVec3], emitter: &Emitter, occluders: &[Occluder], diagonal: f64) -> bool {
     let Some(width) = emitter.width() else { return false };
-    let block = Bounds::of(*hull);
+    let block = Bounds::of(corners.iter().copied());
     let (centre, size) = (block.centre(), block.diagonal());
     let to_emitter = emitter.centre(centre, diagonal).distance(centre);
     occluders.iter().all(|occluder| {

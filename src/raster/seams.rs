@@ -329,6 +329,7 @@ mod tests {
             source_triangles: Vec::new(),
             regions: Vec::new(),
             area: 1.0,
+            smooth: None,
             double_sided: false,
         };
         let report = join(&[surface], &atlas, &mut texels, &owners);

@@ -1,8 +1,8 @@
 //! What stands between an emitter and a rectangle of a surface, handed down to the rectangle's parts.
 
-use glam::DVec3;
-
 use super::direct::Shining;
+use crate::geom::Slab;
+use crate::surface::Surface;
 
 /// So many triangles that stand before a part of a surface are remembered for its parts.
 const MOST_REMEMBERED: usize = 512;
@@ -28,14 +28,12 @@ pub struct Shadowing(pub(super) Vec<Standing>);
 
 impl Shining<'_> {
     /// What stands before a rectangle, told from what is `known` of a larger one.
-    pub(super) fn standing(&self, hull: &[DVec3; 4], known: Option<&Standing>) -> Standing {
+    pub(super) fn standing(&self, block: &Slab, known: Option<&Standing>) -> Standing {
         let found = match known {
             Some(known @ (Standing::Behind | Standing::Nothing | Standing::Umbra)) => return known.clone(),
-            _ if self.emitter.is_behind(hull, self.surface.frame.normal, self.light.tracer.margin()) => {
-                return Standing::Behind;
-            }
-            Some(Standing::Some(between)) => self.standing_before(hull, Some(between)),
-            Some(Standing::Many) | None => self.standing_before(hull, None),
+            _ if self.is_behind(block) => return Standing::Behind,
+            Some(Standing::Some(between)) => self.standing_before(block, Some(between)),
+            Some(Standing::Many) | None => self.standing_before(block, None),
         };
         match found {
             Standing::Some(between) if between.len() > MOST_REMEMBERED => Standing::Many,
@@ -43,13 +41,22 @@ impl Shining<'_> {
         }
     }
 
+    /// Whether none of the emitter's light can reach a block.
+    pub(super) fn is_behind(&self, block: &Slab) -> bool {
+        let Surface { frame, smooth, .. } = self.surface;
+        self.emitter.is_behind(block, frame.normal, smooth.as_deref(), self.light.tracer.margin())
+    }
+
     /// What stands before a block that is not behind the emitter.
-    pub(super) fn standing_before(&self, hull: &[DVec3; 4], inherited: Option<&[u32]>) -> Standing {
+    pub(super) fn standing_before(&self, block: &Slab, inherited: Option<&[u32]>) -> Standing {
         let tracer = self.light.tracer;
-        let between = self.emitter.between(hull, tracer, inherited);
+        let mut between = self.emitter.between(block, tracer, inherited);
+        if let Some(smooth) = &self.surface.smooth {
+            smooth.leave_out_own(&mut between);
+        }
         if between.is_empty() {
             Standing::Nothing
-        } else if self.light.occluders.one_hides(hull, self.emitter, tracer, &between) {
+        } else if self.light.occluders.one_hides(block.corners(), self.emitter, tracer, &between) {
             Standing::Umbra
         } else {
             Standing::Some(between)

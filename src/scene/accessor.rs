@@ -96,6 +96,8 @@ impl Role {
     };
     pub(super) const POSITION: Self =
         Self { name: "POSITION", shapes: &[Shape::Vec3], components: Component::QUANTIZED };
+    pub(super) const NORMAL: Self =
+        Self { name: "NORMAL", shapes: &[Shape::Vec3], components: Component::QUANTIZED };
     pub(super) const TEXCOORD: Self =
         Self { name: "TEXCOORD", shapes: &[Shape::Vec2], components: Component::QUANTIZED };
     pub(super) const COLOR: Self =

@@ -16,7 +16,7 @@ use super::{ImportError, Item, Material, PunctualLight, Scene, SourceDocument};
 use super::{
     container, extension, hierarchy, instancing, material, place, punctual, settings, source, texture, uri,
 };
-use crate::options::Dynamic;
+use crate::options::{Dynamic, Normals};
 
 /// What an import can be told.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,6 +26,8 @@ pub struct ImportOptions {
     pub scene: Option<usize>,
     /// What becomes of meshes that move. Default: [`Dynamic::Ignore`].
     pub dynamic: Dynamic,
+    /// Whether vertices' normals are read. Default: [`Normals::Geometric`], not.
+    pub normals: Normals,
 }
 
 /// Reads the scene in the `.glb` or `.gltf` file at `path`.
@@ -73,14 +75,15 @@ pub fn from_bytes(bytes: &[u8], base: Option<&Path>, options: &ImportOptions) ->
     let accessors = Accessors { document: &document, buffers: &buffers };
     let sets = |material| material::texture_coordinate_sets(&document, material);
     let settings = settings::of_nodes(&json, &document, &nodes, &mut warnings)?;
-    let placed = place::place(accessors, &nodes, (&settings, options.dynamic), &sets, &mut warnings)?;
+    let placed =
+        place::place(accessors, &nodes, &settings, (options.dynamic, options.normals), &sets, &mut warnings)?;
 
     let used = materials_in_use(&document, &placed);
     let palette = material::read(&document, &used, &mut warnings)?;
     let lights = punctual::lights(&document, &nodes, &mut warnings)?;
     let source = SourceDocument { json, buffers, external_images };
     let textures = decode_all(&document, &source, &palette.requests, &mut warnings)?;
-    let Placed { vertices, triangles, placements, attributes } = placed;
+    let Placed { vertices, normals, triangles, placements, attributes } = placed;
     let appearance = Appearance { textures, materials: palette.layers, placements: attributes };
     let mut materials = material::finish(&document, &appearance);
     for (placement, attributes) in placements.iter().zip(&appearance.placements) {
@@ -90,7 +93,7 @@ pub fn from_bytes(bytes: &[u8], base: Option<&Path>, options: &ImportOptions) ->
     }
     warn_of_defaults(&used, &materials, &lights, &mut warnings);
     let warnings = warnings.into_sentences();
-    Ok(Scene { vertices, triangles, placements, materials, lights, appearance, source, warnings })
+    Ok(Scene { vertices, normals, triangles, placements, materials, lights, appearance, source, warnings })
 }
 
 /// Decodes the requested images; one that fails becomes a warning and `None`.

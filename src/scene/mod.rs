@@ -65,6 +65,9 @@ const MAX_COORDINATE: f64 = 1e9;
 pub struct Scene {
     /// World-space positions, metres. Shared by a placement's triangles, not between placements.
     pub vertices: Vec<DVec3>,
+    /// World-space unit normals that the vertices are drawn with, zero where there are none; empty where they were not
+    /// [asked for](ImportOptions::normals).
+    pub normals: Vec<DVec3>,
     /// All triangles of all placements, in placement order and within it in source order.
     /// Zero-area triangles are kept (the output must hold them again).
     pub triangles: Vec<Triangle>,

@@ -13,7 +13,7 @@ use super::primitive::{Geometry, PrimitiveReader, influences, material};
 use super::warning::Warnings;
 use super::{ImportError, Item, MAX_COORDINATE, MAX_COUNT, NodeSettings, Placement, Triangle};
 use crate::geom::triangle::area_normal;
-use crate::options::Dynamic;
+use crate::options::{Dynamic, Normals};
 
 /// A triangle counts as without area where its height is below this share of its longest edge.
 const FLAT: f64 = 1e-12;
@@ -22,6 +22,8 @@ const FLAT: f64 = 1e-12;
 #[derive(Debug, Default)]
 pub(super) struct Placed {
     pub(super) vertices: Vec<DVec3>,
+    /// One a vertex, zero where there is none; none at all where they are not read.
+    pub(super) normals: Vec<DVec3>,
     pub(super) triangles: Vec<Triangle>,
     pub(super) placements: Vec<Placement>,
     /// One entry a placement.
@@ -33,13 +35,15 @@ pub(super) struct Placed {
 pub(super) fn place(
     accessors: Accessors<'_>,
     nodes: &[PlacedNode],
-    (settings, dynamic): (&[NodeSettings], Dynamic),
+    settings: &[NodeSettings],
+    (dynamic, normals): (Dynamic, Normals),
     sets: &dyn Fn(usize) -> Vec<u32>,
     warnings: &mut Warnings,
 ) -> Result<Placed, ImportError> {
     let worlds = nodes.iter().map(|node| (node.index, node.world)).collect();
     let (cache, placed) = (BTreeMap::new(), Placed::default());
-    let mut placer = Placer { accessors, worlds, sets, cache, placed, dynamic, left_out: false, warnings };
+    let mut placer =
+        Placer { accessors, worlds, sets, cache, placed, dynamic, normals, left_out: false, warnings };
     for node in nodes {
         let settings = settings.get(node.index).copied().unwrap_or_default();
         placer.node(*node, settings)?;
@@ -61,6 +65,7 @@ struct Placer<'a> {
     cache: BTreeMap<(usize, usize), Option<Arc<Geometry>>>,
     placed: Placed,
     dynamic: Dynamic,
+    normals: Normals,
     /// Whether something was left out because it moves.
     left_out: bool,
     warnings: &'a mut Warnings,
@@ -142,6 +147,9 @@ impl<'a> Placer<'a> {
             let subject = format!("{} ({flat} of {})", item(), geometry.triangles.len());
             self.warnings.about(subject, "triangles without area, which receive no light");
         }
+        if self.normals == Normals::Shading {
+            self.placed.normals.extend(world_normals(spot, &geometry));
+        }
         self.placed.vertices.extend(world);
         self.placed.attributes.push(Arc::clone(&geometry.attributes));
         self.placed.placements.push(Placement {
@@ -168,8 +176,13 @@ impl<'a> Placer<'a> {
         }
         let document = self.accessors.document;
         let Some(entry) = document.meshes.get(spot.mesh) else { return Ok(None) };
-        let reader =
-            PrimitiveReader { accessors: self.accessors, mesh: spot.mesh, entry, weights: own_weights };
+        let reader = PrimitiveReader {
+            accessors: self.accessors,
+            mesh: spot.mesh,
+            entry,
+            normals: self.normals,
+            weights: own_weights,
+        };
         let sets = (self.sets)(material);
         let geometry = reader.read(spot.primitive, &sets, self.warnings)?.map(Arc::new);
         if let Some(geometry) = &geometry {
@@ -279,6 +292,17 @@ impl<'a> Placer<'a> {
         }
         Ok(matrices)
     }
+}
+
+/// One a vertex: unit length, or zero where there is none or where the mesh moves.
+///
+/// The transform's inverse transpose keeps them on the side that the winding shows, mirrored or not.
+fn world_normals(spot: &Spot, geometry: &Geometry) -> Vec<DVec3> {
+    if geometry.normals.is_empty() || spot.settings.is_dynamic {
+        return vec![DVec3::ZERO; geometry.positions.len()];
+    }
+    let to_world = spot.node.world.matrix3.inverse().transpose();
+    geometry.normals.iter().map(|&normal| (to_world * normal).normalize_or_zero()).collect()
 }
 
 fn refuse_excess(what: &'static str, present: usize, more: usize) -> Result<(), ImportError> {

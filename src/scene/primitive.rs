@@ -12,12 +12,15 @@ use super::appearance::Attributes;
 use super::document::{Mesh, Primitive, follow};
 use super::warning::Warnings;
 use super::{ImportError, Item, extension};
+use crate::options::Normals;
 
 /// What a placement needs of a primitive.
 #[derive(Clone, Debug)]
 pub(super) struct Geometry {
     /// Positions in the mesh's coordinates, default morph weights applied.
     pub(super) positions: Vec<DVec3>,
+    /// Normals in the mesh's coordinates, one a position, or none at all.
+    pub(super) normals: Vec<DVec3>,
     /// Corners as indices into `positions`, all in range.
     pub(super) triangles: Vec<[u32; 3]>,
     /// What varies over it beside the position.
@@ -31,6 +34,8 @@ pub(super) struct PrimitiveReader<'a> {
     pub(super) mesh: usize,
     /// The mesh.
     pub(super) entry: &'a Mesh,
+    /// Whether normals are read.
+    pub(super) normals: Normals,
     /// Morph weights that the node sets in place of the mesh's.
     pub(super) weights: Option<&'a [f64]>,
 }
@@ -83,8 +88,9 @@ impl PrimitiveReader<'_> {
             warnings.about(item(), "it holds no triangle and is left out");
             return Ok(None);
         }
+        let normals = self.normals(primitive, positions.len(), &item)?;
         let attributes = Arc::new(self.attributes(primitive, positions.len(), sets, &item)?);
-        Ok(Some(Geometry { positions, triangles, attributes }))
+        Ok(Some(Geometry { positions, normals, triangles, attributes }))
     }
 
     /// A compressed primitive that merely says so in `extensionsUsed` may lack its plain data.
@@ -99,6 +105,21 @@ impl PrimitiveReader<'_> {
 
     fn positions(&self, accessor: usize, item: &impl Fn() -> Item) -> Result<Vec<DVec3>, ImportError> {
         let numbers = self.accessors.read(accessor, &Role::POSITION, item)?;
+        Ok(numbers.arrays().map(DVec3::from_array).collect())
+    }
+
+    fn normals(
+        &self,
+        primitive: &Primitive,
+        count: usize,
+        item: &impl Fn() -> Item,
+    ) -> Result<Vec<DVec3>, ImportError> {
+        let Some(&accessor) = primitive.attributes.get("NORMAL").filter(|_| self.normals == Normals::Shading)
+        else {
+            return Ok(Vec::new());
+        };
+        let numbers = self.accessors.read(accessor, &Role::NORMAL, item)?;
+        check_length(&numbers, "NORMAL", count, item)?;
         Ok(numbers.arrays().map(DVec3::from_array).collect())
     }
 

@@ -136,14 +136,17 @@ impl<'a> Receiving<'a> {
     /// `inherited` holds what stands in the parent's shaft.
     fn receive(&mut self, element: u32, inherited: Option<&[u32]>) {
         let tracer = self.pass.tracer;
-        let hull = self.facet.hull(element);
-        if self.emitter.is_behind(&hull, self.facet.frame.normal, tracer.margin()) {
+        let (slab, smooth) = (self.facet.slab(element), self.facet.smooth.as_deref());
+        if self.emitter.is_behind(&slab, self.facet.frame.normal, smooth, tracer.margin()) {
             return;
         }
-        let between = self.emitter.between(&hull, tracer, inherited);
+        let mut between = self.emitter.between(&slab, tracer, inherited);
+        if let Some(smooth) = smooth {
+            smooth.leave_out_own(&mut between);
+        }
         let is_umbra = self.pass.options.umbra_test == Toggle::On
             && !between.is_empty()
-            && self.pass.occluders.one_hides(&hull, self.emitter, tracer, &between);
+            && self.pass.occluders.one_hides(slab.corners(), self.emitter, tracer, &between);
         if !self.facet.elements[element as usize].is_leaf() {
             if !is_umbra {
                 self.receive_in_parts(element, &between);
@@ -151,9 +154,7 @@ impl<'a> Receiving<'a> {
             return;
         }
         self.middle = None;
-        if self.should_split(element, &hull, &between, is_umbra)
-            && self.facet.split(element, self.pass.appearance)
-        {
+        if self.should_split(element, &between, is_umbra) && self.facet.split(element, self.pass.appearance) {
             self.values.resize(self.facet.samples.len(), None);
             self.receive_in_parts(element, &between);
         } else if !is_umbra {
@@ -175,7 +176,7 @@ impl<'a> Receiving<'a> {
         }
     }
 
-    fn should_split(&mut self, element: u32, hull: &[DVec3], between: &[u32], is_umbra: bool) -> bool {
+    fn should_split(&mut self, element: u32, between: &[u32], is_umbra: bool) -> bool {
         let options = self.pass.options;
         let size = self.facet.elements[element as usize].size();
         if size <= self.pass.threshold {
@@ -192,7 +193,7 @@ impl<'a> Receiving<'a> {
                 return true;
             }
             Refine::Cob | Refine::CobGradient => {
-                if self.close_shadow(element, hull, between) {
+                if self.close_shadow(element, between) {
                     if is_umbra {
                         self.counts.saved_by_umbra += 1;
                     } else {
@@ -211,12 +212,12 @@ impl<'a> Receiving<'a> {
     }
 
     /// The paper's criterion: a strong shot, and something close that may shade it.
-    fn close_shadow(&mut self, element: u32, hull: &[DVec3], between: &[u32]) -> bool {
+    fn close_shadow(&mut self, element: u32, between: &[u32]) -> bool {
         if !self.is_strong(element) {
             return false;
         }
         let begin = Instant::now();
-        let cob = self.cob(element, hull);
+        let cob = self.cob(element);
         let entries = self.facet.cobs.entries(cob);
         // Both lists ascend.
         let counts = self.pass.options.shaft_test == Toggle::Off
@@ -253,7 +254,7 @@ impl<'a> Receiving<'a> {
     }
 
     /// The element's buffer, filled if it was not.
-    fn cob(&mut self, element: u32, hull: &[DVec3]) -> Cob {
+    fn cob(&mut self, element: u32) -> Cob {
         let e = &self.facet.elements[element as usize];
         if e.cob.state() != CobState::Uninitialized {
             return e.cob;
@@ -262,7 +263,8 @@ impl<'a> Receiving<'a> {
             if e.parent == NONE { Cob::UNINITIALIZED } else { self.facet.elements[e.parent as usize].cob };
         let height = prism_height(self.pass.options.cob_height, e.size());
         let tracer = self.pass.tracer;
-        let prism = Prism::over(hull, self.facet.frame.normal, height, tracer.margin() * 0.5);
+        let prism =
+            Prism::over(&self.facet.hull(element), self.facet.frame.normal, height, tracer.margin() * 0.5);
         let cob = self.facet.cobs.fill(&prism, parent, tracer);
         self.facet.elements[element as usize].cob = cob;
         cob

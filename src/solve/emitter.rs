@@ -10,9 +10,10 @@ use super::form_factor::{SurfacePoint, signed_point_to_polygon};
 use super::umbra::Occluder;
 use super::visible::{ConvexParts, Workspace, visible_form_factor};
 use crate::geom::hull::convex_hull;
-use crate::geom::{Bounds, Frame};
+use crate::geom::{Bounds, Frame, Slab};
 use crate::light::luminance;
 use crate::scene::{PunctualKind, PunctualLight};
+use crate::surface::SmoothNormals;
 use crate::trace::shaft::Shaft;
 use crate::trace::{FanStack, Tracer};
 
@@ -279,29 +280,28 @@ impl Emitter {
         (own.min - block.max).max(block.min - own.max).max(DVec3::ZERO).length()
     }
 
-    /// The shaft from a convex receiving polygon to the emitter.
+    /// The shaft from where light is received to the emitter.
     #[must_use]
-    pub fn shaft(&self, receiver: &[DVec3], tracer: &Tracer) -> Shaft {
+    pub fn shaft(&self, receiver: &Slab, tracer: &Tracer) -> Shaft {
         let margin = tracer.margin() * 0.5;
-        match self {
-            Self::Area(area) => Shaft::between(receiver, &area.hull, margin),
+        let shooter = match self {
+            Self::Area(area) => Slab::flat(area.hull.clone()),
             Self::Punctual(light) => match light.kind {
                 PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {
-                    Shaft::between(receiver, &[position], margin)
+                    Slab::flat(vec![position])
                 }
                 PunctualKind::Directional { direction } => {
-                    let away: Vec<_> =
-                        receiver.iter().map(|&p| p - direction * (2.0 * tracer.diagonal())).collect();
-                    Shaft::between(receiver, &away, margin)
+                    receiver.moved(direction * (-2.0 * tracer.diagonal()))
                 }
             },
-        }
+        };
+        Shaft::between_slabs(receiver, &shooter, margin)
     }
 
     /// The triangles that reach into the shaft from `receiver`, ascending. `inherited` holds what reaches
     /// into a shaft that contains this one: the parent's, handed down.
     #[must_use]
-    pub fn between(&self, receiver: &[DVec3], tracer: &Tracer, inherited: Option<&[u32]>) -> Vec<u32> {
+    pub fn between(&self, receiver: &Slab, tracer: &Tracer, inherited: Option<&[u32]>) -> Vec<u32> {
         let mut between = Vec::new();
         match inherited {
             None => self.shaft(receiver, tracer).gather(tracer, &mut between),
@@ -320,19 +320,38 @@ impl Emitter {
         }
     }
 
-    /// Whether none of its light can reach a polygon that faces along `normal` with these corners.
+    /// Whether none of its light can reach a receiving place in a plane that faces along `normal`, or is drawn with
+    /// `smooth` normals.
     #[must_use]
-    pub fn is_behind(&self, corners: &[DVec3], normal: DVec3, margin: f64) -> bool {
+    pub fn is_behind(
+        &self,
+        receiver: &Slab,
+        normal: DVec3,
+        smooth: Option<&SmoothNormals>,
+        margin: f64,
+    ) -> bool {
+        let corners = receiver.corners();
         let Some(&first) = corners.first() else { return true };
+        let Some(smooth) = smooth else { return self.is_behind_from(first, corners, normal, margin) };
+        let is_behind = |normal: &DVec3| {
+            let lowest = corners.iter().min_by(|a, b| normal.dot(**a).total_cmp(&normal.dot(**b)));
+            self.is_behind_from(*lowest.unwrap_or(&first), corners, *normal, margin)
+        };
+        !smooth.normals().is_empty() && smooth.normals().iter().all(is_behind)
+    }
+
+    /// Whether none of its light can reach places with these corners that face along `normal`, of which `lowest` is
+    /// the one that lies farthest back.
+    fn is_behind_from(&self, lowest: DVec3, corners: &[DVec3], normal: DVec3, margin: f64) -> bool {
         match self {
             Self::Area(area) => {
-                area.hull.iter().all(|&q| normal.dot(q - first) <= margin)
+                area.hull.iter().all(|&q| normal.dot(q - lowest) <= margin)
                     || corners.iter().all(|&p| area.frame.height(p) <= margin)
             }
             Self::Punctual(light) => match light.kind {
                 PunctualKind::Directional { direction } => normal.dot(direction) >= 0.0,
                 PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {
-                    normal.dot(position - first) <= margin
+                    normal.dot(position - lowest) <= margin
                 }
             },
         }

@@ -205,6 +205,12 @@ impl<'a> RadiosityField<'a> {
         at & !LEAF
     }
 
+    /// Whether a ray met this surface.
+    #[must_use]
+    pub fn is_of(&self, hit: &Hit, surface: usize) -> bool {
+        self.locator.surface_of(hit.triangle) as usize == surface
+    }
+
     /// The radiosity that a ray met at `point`; zero on the back of a single-sided surface.
     #[inline]
     #[must_use]

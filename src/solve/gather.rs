@@ -369,12 +369,19 @@ impl Gathering<'_> {
     fn at(&mut self, point: SurfacePoint) -> Gathered {
         let tracer = self.pass.tracer;
         let fans = self.source.directions.fans(self.level);
-        let Frame { u, v, normal, .. } = self.facet.frame;
+        let smooth = self.facet.smooth.as_deref();
+        let Frame { u, v, normal, .. } = match smooth {
+            None => self.facet.frame,
+            Some(_) => Frame::new(point.position, point.normal, self.facet.frame.u),
+        };
         let (mut sum, mut nearness, mut near) = (DVec3::ZERO, 0.0, 0_u32);
-        let reach = self.receiver.reach;
+        let (reach, surface) = (self.receiver.reach, self.facet.surface);
         let Source { field, hot_spots, .. } = self.source;
         tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at, share| {
             sum += share * field.radiosity(tracer, hit, at).as_dvec3();
+            if smooth.is_some() && field.is_of(hit, surface) {
+                return; // a facet of a hollow: so near that it would tell nothing of what else is about
+            }
             nearness += share / hit.distance.max(tracer.margin());
             near += u32::from(hit.distance < reach);
         });

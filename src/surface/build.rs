@@ -1,6 +1,7 @@
 //! The stage itself: group, outline, find contacts, cut.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -9,7 +10,7 @@ use super::facet::Facets;
 use super::group::{Apart, group};
 use super::outline::{Outline, outline};
 use super::region::Cutting;
-use super::{Geometry, Region, Surface, SurfaceSet};
+use super::{Geometry, Region, SmoothNormals, Surface, SurfaceSet};
 use crate::geom::Bounds;
 
 /// Contact tolerance against the scene's diagonal: what f32 positions are exact to, and room for the
@@ -158,6 +159,7 @@ impl Search<'_> {
 
     fn surface(&self, grouped: Grouped, regions: Vec<Region>, dropped: usize) -> Finished {
         let Grouped { placement, outline: Outline { frame, rings, area }, triangles, .. } = grouped;
+        let smooth = SmoothNormals::of(self.geometry, &frame, &triangles).map(Arc::new);
         let surface = Surface {
             placement,
             material: self.material(placement),
@@ -166,6 +168,7 @@ impl Search<'_> {
             source_triangles: triangles,
             regions,
             area,
+            smooth,
             double_sided: self.is_double_sided(placement),
         };
         Finished { surface, dropped }

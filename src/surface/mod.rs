@@ -3,7 +3,8 @@
 //!
 //! In order: a placement's triangles get shared vertices (`weld`, `facet`), coplanar neighbours are
 //! grouped (`group`) and outlined (`outline`, `boundary`); then triangles that meet or cut a surface
-//! are found (`contact`) and cut it into regions (`dangling`, `region`).
+//! are found (`contact`) and cut it into regions (`dangling`, `region`). What is drawn as curved keeps its normals
+//! (`smooth`).
 
 mod boundary;
 mod build;
@@ -14,12 +15,16 @@ mod group;
 mod layout;
 mod outline;
 mod region;
+mod smooth;
 mod weld;
+
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
 pub use build::build_surfaces;
 pub use contact::BoxQuery;
+pub use smooth::{SmoothNormals, SmoothPlace};
 
 use crate::geom::{Frame, Ring};
 use crate::scene::{Placement, Scene, Triangle};
@@ -29,6 +34,8 @@ use crate::scene::{Placement, Scene, Triangle};
 pub struct Geometry<'a> {
     /// World-space positions, metres.
     pub vertices: &'a [DVec3],
+    /// Unit normals that the vertices are drawn with, as [`Scene::normals`]; none at all where facets are lit.
+    pub normals: &'a [DVec3],
     /// All triangles.
     pub triangles: &'a [Triangle],
     /// Which of them belong together.
@@ -44,6 +51,7 @@ impl<'a> From<&'a Scene> for Geometry<'a> {
     fn from(scene: &'a Scene) -> Self {
         Self {
             vertices: &scene.vertices,
+            normals: &scene.normals,
             triangles: &scene.triangles,
             placements: &scene.placements,
             double_sided: scene.materials.iter().map(|m| m.double_sided).collect(),
@@ -82,6 +90,8 @@ pub struct Surface {
     pub regions: Vec<Region>,
     /// Area, square metres, above 0.
     pub area: f64,
+    /// The normals that it is lit by; `None` where these are the plane's.
+    pub smooth: Option<Arc<SmoothNormals>>,
     /// Whether the back is a surface like the front (material `doubleSided`).
     pub double_sided: bool,
 }

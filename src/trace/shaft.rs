@@ -9,7 +9,7 @@
 use glam::DVec3;
 
 use super::Tracer;
-use crate::geom::Bounds;
+use crate::geom::{Bounds, Slab};
 
 /// A triangle cut by a shaft's planes has fewer corners than this.
 const MOST_CORNERS: usize = 20;
@@ -80,12 +80,28 @@ impl Shaft {
     /// `shooter` may be a single point. `margin` (metres) is how deep something must reach in to count.
     #[must_use]
     pub fn between(receiver: &[DVec3], shooter: &[DVec3], margin: f64) -> Self {
-        let mut planes = Vec::with_capacity(receiver.len() + shooter.len() + 2);
         let bounds = Bounds::of(receiver.iter().chain(shooter).copied());
-        add_caps(receiver, shooter, margin, &mut planes);
-        add_caps(shooter, receiver, margin, &mut planes);
-        add_sides(receiver, shooter, margin, &mut planes);
-        add_sides(shooter, receiver, margin, &mut planes);
+        Self::within(planes_between(receiver, shooter, margin), bounds, margin)
+    }
+
+    /// The shaft between two slabs: of planes that the faces tell, so that it may hold a little more than their hull.
+    #[must_use]
+    pub fn between_slabs(receiver: &Slab, shooter: &Slab, margin: f64) -> Self {
+        let (receivers, shooters) = (receiver.faces(), shooter.faces());
+        if let ([receiver], [shooter]) = (&receivers[..], &shooters[..]) {
+            return Self::between(receiver, shooter, margin);
+        }
+        let all = || receiver.corners().iter().chain(shooter.corners()).copied();
+        let mut planes = Vec::new();
+        for (&receiver, &shooter) in receivers.iter().flat_map(|r| shooters.iter().map(move |s| (r, s))) {
+            let of_faces = planes_between(receiver, shooter, margin);
+            let holding = of_faces.into_iter().filter(|plane| all().all(|p| plane.height(p) >= -margin));
+            holding.for_each(|plane| push_new(plane, &mut planes));
+        }
+        Self::within(planes, Bounds::of(all()), margin)
+    }
+
+    fn within(planes: Vec<HalfSpace>, bounds: Bounds, margin: f64) -> Self {
         let lanes = planes.chunks(LANES).map(|planes| PlaneLanes::new(planes, margin)).collect();
         Self { planes, lanes, bounds, margin }
     }
@@ -195,6 +211,16 @@ impl HalfSpace {
     }
 }
 
+/// The planes that bound the hull of two convex planar polygons.
+fn planes_between(receiver: &[DVec3], shooter: &[DVec3], margin: f64) -> Vec<HalfSpace> {
+    let mut planes = Vec::with_capacity(receiver.len() + shooter.len() + 2);
+    add_caps(receiver, shooter, margin, &mut planes);
+    add_caps(shooter, receiver, margin, &mut planes);
+    add_sides(receiver, shooter, margin, &mut planes);
+    add_sides(shooter, receiver, margin, &mut planes);
+    planes
+}
+
 /// The plane of `polygon` itself bounds the hull where `other` lies wholly on one side of it.
 fn add_caps(polygon: &[DVec3], other: &[DVec3], margin: f64, planes: &mut Vec<HalfSpace>) {
     let Some(normal) = normal_of(polygon) else { return };
@@ -263,9 +289,13 @@ fn push_oriented(plane: HalfSpace, side: Side, planes: &mut Vec<HalfSpace>) {
         Side::Behind => HalfSpace { normal: -plane.normal, offset: -plane.offset },
         Side::On | Side::Mixed => return,
     };
-    // The same face can come from several corner pairs.
-    if !planes.iter().any(|p| p.normal.dot(oriented.normal) > 1.0 - 1e-12) {
-        planes.push(oriented);
+    push_new(oriented, planes);
+}
+
+/// The same face can come from several corner pairs.
+fn push_new(plane: HalfSpace, planes: &mut Vec<HalfSpace>) {
+    if !planes.iter().any(|p| p.normal.dot(plane.normal) > 1.0 - 1e-12) {
+        planes.push(plane);
     }
 }
 

@@ -332,7 +332,17 @@ pub(crate) fn place(source: SourceDocument) -> Scene {
     }
     let (materials, lights, warnings) = (Vec::new(), Vec::new(), Vec::new());
     let appearance = Default::default();
-    Scene { vertices, triangles, placements, materials, lights, source, warnings, appearance }
+    Scene {
+        vertices,
+        normals: Vec::new(),
+        triangles,
+        placements,
+        materials,
+        lights,
+        source,
+        warnings,
+        appearance,
+    }
 }
 
 /// The planes of each placement; their outlines are taken to be the hulls' bounding boxes.
@@ -363,6 +373,7 @@ fn surfaces(scene: &Scene) -> Vec<Surface> {
                 source_triangles,
                 regions: Vec::new(),
                 area: (high - low).element_product(),
+                smooth: None,
                 double_sided: false,
             }
         })

@@ -27,6 +27,7 @@ pub(crate) fn polygon(corners: &[DVec3], index: usize) -> Surface {
         source_triangles: (index..index + count).collect(),
         regions: vec![Region { rings: vec![ring], triangles, area }],
         area,
+        smooth: None,
         double_sided: false,
     }
 }
