@@ -27,6 +27,7 @@ const OPTIONS: [&str; 36] = [
     "--texels-per-metre",
     "--dynamic",
     "--normals",
+    "--keep-uv1",
     "--elements",
     "--threads",
     "--report",
