@@ -292,14 +292,20 @@ fn neighbours_agree() {
     assert!(edges > 200, "{edges}");
 }
 
-/// What is flat is the same either way, to the byte.
+/// What is flat is the same either way, to the byte, its normals rounded to eight bits; so is what has normals that
+/// point inwards.
 #[test]
 fn flat_surfaces_stay_as_they_are() {
     let room = Mesh::cuboid(DVec3::new(2.0, 2.5, 1.5)).inside_out();
-    let block = Mesh::cuboid(DVec3::new(0.4, 0.5, 0.6));
-    let model = Model::new().with(&block, (0.5, 0.0), DVec3::ONE).with(&room, (0.7, 1.0), DVec3::ONE);
-    let [geometric, shading] = [Normals::Geometric, Normals::Shading].map(|n| model.bake(n, 64).glb);
-    assert!(geometric == shading);
+    let mut block = Mesh::cuboid(DVec3::new(0.4, 0.5, 0.6));
+    block.normals.iter_mut().flatten().for_each(|n| *n += DVec3::new(0.003, -0.002, 0.004));
+    let mut wrong = Mesh::sphere();
+    wrong.normals.iter_mut().flatten().for_each(|n| *n = -*n);
+    for mesh in [block, wrong] {
+        let model = Model::new().with(&mesh, (0.5, 0.0), DVec3::ONE).with(&room, (0.7, 1.0), DVec3::ONE);
+        let [geometric, shading] = [Normals::Geometric, Normals::Shading].map(|n| model.bake(n, 128).glb);
+        assert!(geometric == shading);
+    }
 }
 
 /// Facets are lit as facets unless told otherwise, whatever is wrong with their normals.
