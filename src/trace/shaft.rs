@@ -323,6 +323,20 @@ mod tests {
         ]
     }
 
+    /// What hides the shooter from a place above the receiver's plane alone is in the shaft; what lies below is not.
+    #[test]
+    fn shafts_of_slabs_hold_their_depth() {
+        let shooter = Slab::flat(square(2.0, 0.1).to_vec());
+        for depth in [0.0, 0.5] {
+            let receiver = Slab::thick(square(0.0, 1.0).to_vec(), depth * DVec3::Z);
+            let shaft = Shaft::between_slabs(&receiver, &shooter, MARGIN);
+            assert_eq!(shaft.touches(&small_triangle(DVec3::new(0.9, 0.0, 0.4), 0.01)), depth > 0.0);
+            assert!(shaft.touches(&small_triangle(DVec3::new(0.0, 0.0, 1.0), 0.01)));
+            assert!(!shaft.touches(&small_triangle(DVec3::new(0.0, 0.0, -0.1), 0.01)));
+            assert!(!shaft.touches(&small_triangle(DVec3::new(0.9, 0.0, 1.5), 0.01)));
+        }
+    }
+
     /// A second method: a segment between random points of the polygons that meets the triangle.
     fn some_segment_meets(receiver: [DVec3; 4], shooter: [DVec3; 4], triangle: [DVec3; 3]) -> bool {
         let tracer = Tracer::new(vec![triangle]);
