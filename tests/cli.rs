@@ -12,7 +12,7 @@ use tempfile::TempDir;
 const SMALL: [&str; 2] = ["--size", "32"];
 
 /// Everything that `cobake bake` can be told.
-const OPTIONS: [&str; 36] = [
+const OPTIONS: [&str; 37] = [
     "--pages",
     "--separate",
     "--for",
