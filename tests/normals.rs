@@ -131,7 +131,7 @@ impl Model {
     }
 
     /// Adds a light that shines from `place`, from far away where it is directional.
-    fn lit(mut self, light: Value, place: DVec3) -> Self {
+    fn lit(mut self, light: &Value, place: DVec3) -> Self {
         self.draft.set("/extensions", json!({"KHR_lights_punctual": {"lights": [light]}}));
         self.draft.set("/extensionsUsed", json!(["KHR_lights_punctual", "KHR_materials_emissive_strength"]));
         let turn = glam::DQuat::from_rotation_arc(-DVec3::Z, -place.normalize());
@@ -203,7 +203,7 @@ const BLACK: (f64, f64) = (0.0, 0.0);
 const SUN: DVec3 = DVec3::new(0.3, -0.5, 0.7);
 
 fn sunlit(mesh: &Mesh, scale: DVec3) -> Model {
-    Model::new().with(mesh, BLACK, scale).lit(json!({"type": "directional", "intensity": 1}), SUN)
+    Model::new().with(mesh, BLACK, scale).lit(&json!({"type": "directional", "intensity": 1}), SUN)
 }
 
 /// No facets, and no blotches where the normals turn away from the light.
@@ -224,7 +224,7 @@ fn normals_are_stretched_and_mirrored() {
 fn a_coarse_sphere_under_a_lamp_is_round() {
     let lamp = 8.0 * SUN.normalize();
     let model = Model::new().with(&Mesh::sphere(), BLACK, DVec3::ONE);
-    let model = model.lit(json!({"type": "point", "intensity": 49}), lamp);
+    let model = model.lit(&json!({"type": "point", "intensity": 49}), lamp);
     assert_seen(&model, 512, 1.0, |_, normal| {
         let way = lamp - normal;
         49.0 * normal.dot(way).max(0.0) / way.length().powi(3)
@@ -236,7 +236,7 @@ fn a_coarse_sphere_under_a_lamp_is_round() {
 fn a_hollow_sphere_is_round() {
     let lamp = DVec3::new(0.2, 0.3, -0.1);
     let model = Model::new().with(&Mesh::sphere().inside_out(), BLACK, DVec3::ONE);
-    let model = model.lit(json!({"type": "point", "intensity": 1}), lamp);
+    let model = model.lit(&json!({"type": "point", "intensity": 1}), lamp);
     assert_seen(&model, 512, 2.0, |point, normal| {
         let way = lamp - point;
         normal.dot(way).max(0.0) / way.length().powi(3)
