@@ -243,6 +243,33 @@ fn a_hollow_sphere_is_round() {
     });
 }
 
+/// A bowl's own wall throws its shadow into it: facets in that shadow have no light, though their normals face the sun.
+#[test]
+fn a_bowl_shades_itself() {
+    let whole = Mesh::sphere().inside_out();
+    let mut bowl = Mesh::default();
+    for (triangle, normals) in whole.triangles.iter().zip(&whole.normals) {
+        if triangle.iter().all(|p| p.z < 1e-6) {
+            bowl.triangles.push(*triangle);
+            bowl.normals.push(*normals);
+        }
+    }
+    let model = sunlit(&bowl, DVec3::ONE);
+    let (sun, mut facing) = (SUN.normalize(), 0);
+    for (point, normal, seen) in model.seen(&model.bake(Normals::Shading, 512)) {
+        let cosine = normal.dot(sun);
+        // Where the way to the sun leaves the sphere.
+        let height = (-normal + 2.0 * cosine * sun).z;
+        if height < -0.2 || cosine < 0.0 {
+            facing += u32::from(cosine > 0.05);
+            assert!(seen < WITHIN, "{point} in the shadow: {seen}, cosine {cosine}");
+        } else if height > 0.2 {
+            assert!((seen - cosine).abs() < WITHIN, "{point} in the sun: {seen}, cosine {cosine}");
+        }
+    }
+    assert!(facing > 20, "{facing}");
+}
+
 /// White furnaces: in a room that glows evenly a sphere has even light, and in a sphere that does.
 #[test]
 fn even_light_is_even() {

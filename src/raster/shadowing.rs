@@ -52,7 +52,7 @@ impl Shining<'_> {
         let tracer = self.light.tracer;
         let mut between = self.emitter.between(block, tracer, inherited);
         if let Some(smooth) = &self.surface.smooth {
-            smooth.leave_out_own(&mut between);
+            smooth.settle_own(self.emitter.reaches_behind(&self.surface.frame), &mut between);
         }
         if between.is_empty() {
             Standing::Nothing

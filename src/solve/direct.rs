@@ -142,7 +142,7 @@ impl<'a> Receiving<'a> {
         }
         let mut between = self.emitter.between(&slab, tracer, inherited);
         if let Some(smooth) = smooth {
-            smooth.leave_out_own(&mut between);
+            smooth.settle_own(self.emitter.reaches_behind(&self.facet.frame), &mut between);
         }
         let is_umbra = self.pass.options.umbra_test == Toggle::On
             && !between.is_empty()

@@ -357,6 +357,20 @@ impl Emitter {
         }
     }
 
+    /// Whether some of its light comes from behind a plane.
+    #[must_use]
+    pub fn reaches_behind(&self, plane: &Frame) -> bool {
+        match self {
+            Self::Area(area) => area.hull.iter().any(|&q| plane.height(q) < 0.0),
+            Self::Punctual(light) => match light.kind {
+                PunctualKind::Directional { direction } => plane.normal.dot(direction) > 0.0,
+                PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {
+                    plane.height(position) < 0.0
+                }
+            },
+        }
+    }
+
     /// Centre, for the paper's point-to-point estimate; the direction's far end for a directional light.
     #[must_use]
     pub fn centre(&self, at: DVec3, diagonal: f64) -> DVec3 {

@@ -40,8 +40,9 @@ pub struct SmoothNormals {
     normals: Vec<DVec3>,
     /// The box that all offsets lie in: along the frame's axes and its normal, metres.
     reach: [DVec3; 2],
-    /// The surface's triangles where they are convex, ascending.
-    convex: Vec<u32>,
+    /// The surface's triangles, ascending.
+    own: Vec<u32>,
+    is_convex: bool,
 }
 
 /// A place on a smooth surface.
@@ -102,12 +103,9 @@ impl SmoothNormals {
         if !is_smooth {
             return None;
         }
-        let mut convex = Vec::new();
-        if triangles.iter().all(is_convex) {
-            convex = source_triangles.iter().map(|&t| t as u32).collect();
-            convex.sort_unstable();
-        }
-        Some(Self::new(frame, triangles, convex))
+        let mut own: Vec<u32> = source_triangles.iter().map(|&t| t as u32).collect();
+        own.sort_unstable();
+        Some(Self::new(frame, triangles, own))
     }
 
     /// The same as seen from behind, in the [flipped](Frame::flipped) frame.
@@ -115,12 +113,10 @@ impl SmoothNormals {
     pub fn flipped(&self, frame: &Frame) -> Self {
         let corner = |c: Corner| Corner::new(frame, DVec2::new(c.place.x, -c.place.y), -c.normal);
         let triangles: Vec<_> = self.triangles.iter().map(|&[a, b, c]| [a, c, b].map(corner)).collect();
-        let is_hollow = triangles.iter().any(|t| !is_convex(t));
-        let convex = if is_hollow { Vec::new() } else { self.convex.clone() };
-        Self::new(frame, triangles, convex)
+        Self::new(frame, triangles, self.own.clone())
     }
 
-    fn new(frame: &Frame, triangles: Vec<[Corner; 3]>, convex: Vec<u32>) -> Self {
+    fn new(frame: &Frame, triangles: Vec<[Corner; 3]>, own: Vec<u32>) -> Self {
         let places: Vec<[DVec2; 3]> = triangles.iter().map(|t| t.map(|c| c.place)).collect();
         let (mut normals, mut reach) = (Vec::new(), [DVec3::ZERO; 2]);
         for triangle in &triangles {
@@ -137,7 +133,8 @@ impl SmoothNormals {
         if normals.len() > MOST_NORMALS {
             normals.clear();
         }
-        Self { grid: TriangleGrid::new(&places), triangles, normals, reach, convex }
+        let is_convex = triangles.iter().all(is_convex);
+        Self { grid: TriangleGrid::new(&places), triangles, normals, reach, own, is_convex }
     }
 
     /// The place on the curved surface that stands for one of the plane.
@@ -176,9 +173,16 @@ impl SmoothNormals {
         Slab::thick(convex_hull(moved).into_iter().map(|p| frame.lift(p)).collect(), frame.normal * high.z)
     }
 
-    /// Leaves the surface's own triangles out of `occluders`, ascending, where the curved surface hides none of itself.
-    pub fn leave_out_own(&self, occluders: &mut Vec<u32>) {
-        occluders.retain(|t| self.convex.binary_search(t).is_err());
+    /// Corrects the `occluders` before light, ascending, for the surface's own triangles: where it is convex they hide
+    /// nothing from itself; in a hollow they hide what reaches behind the facet, which the normals may face.
+    pub fn settle_own(&self, reaches_behind: bool, occluders: &mut Vec<u32>) {
+        if self.is_convex {
+            occluders.retain(|t| self.own.binary_search(t).is_err());
+        } else if reaches_behind {
+            occluders.extend(&self.own);
+            occluders.sort_unstable();
+            occluders.dedup();
+        }
     }
 }
 
@@ -232,9 +236,11 @@ mod tests {
         assert!((place.normal + smooth.at(p).normal).length() < 1e-12);
         assert!(place.offset.length() < 1e-12);
         let mut occluders = vec![3, 7, 9];
-        back.leave_out_own(&mut occluders);
-        assert_eq!(occluders, [3, 7, 9]);
-        smooth.leave_out_own(&mut occluders);
+        smooth.settle_own(true, &mut occluders);
         assert_eq!(occluders, [3, 9]);
+        back.settle_own(false, &mut occluders);
+        assert_eq!(occluders, [3, 9]);
+        back.settle_own(true, &mut occluders);
+        assert_eq!(occluders, [3, 7, 9]);
     }
 }
