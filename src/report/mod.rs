@@ -286,6 +286,7 @@ mod tests {
             "bytes",
             "png_bytes",
             "seams",
+            "layouts",
             "pages",
         ];
         assert_eq!(keys(&json["lightmap"]["density"]), ["least", "median", "greatest"]);
