@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec2;
 
 use crate::geom::TriangleGrid;
-use crate::geom::polygon::{clip_half_plane, orient, signed_area};
+use crate::geom::polygon::{clip_triangle, orient, signed_area};
 
 /// How deep triangles may lie in each other, as a share of the layout's longer side: what coordinates of 16 bits, or
 /// of 32 after a few sums, leave at edges.
@@ -36,23 +36,12 @@ pub(super) fn overlaps(
                 // Of the buckets that both lie in, one counts.
                 let corner = least(one).max(least(other));
                 if !is_apart() && std::ptr::eq(bucket, grid.candidates(corner)) {
-                    visit([a, b], shared_area(one, other))?;
+                    visit([a, b], signed_area(&clip_triangle(one, &other)))?;
                 }
             }
         }
     }
     ControlFlow::Continue(())
-}
-
-/// The area that two counter-clockwise triangles share.
-fn shared_area(one: [DVec2; 3], other: [DVec2; 3]) -> f64 {
-    let sides = (0..3).map(|k| [other[k], other[(k + 1) % 3]]);
-    let shared = sides.fold(one.to_vec(), |ring, [a, b]| {
-        // Inside lies to the left of a side.
-        let normal = (b - a).perp();
-        clip_half_plane(&ring, normal, normal.dot(a))
-    });
-    signed_area(&shared)
 }
 
 fn least([a, b, c]: [DVec2; 3]) -> DVec2 {

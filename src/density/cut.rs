@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::survey::Surveys;
 use super::{Cell, DensityOptions, LEVELS, SurfaceSurvey};
-use crate::geom::polygon::{orient, rectangle};
+use crate::geom::polygon::{clip_triangle, orient, rectangle};
 use crate::surface::Surface;
-use crate::unwrap::{Part, clip};
+use crate::unwrap::Part;
 
 /// Cuts that are tried along each side of a part, at most.
 const CUTS: usize = 24;
@@ -118,7 +118,7 @@ fn parts_of(index: usize, surface: &Surface, leaves: &[Leaf]) -> Vec<Part> {
     };
     let area = |part: &Part| -> f64 {
         let triangles = surface.regions.iter().flat_map(|r| &r.triangles);
-        let inside = triangles.map(|&t| clip(t, &part.outline));
+        let inside = triangles.map(|&t| clip_triangle(t, &part.outline));
         inside
             .map(|ring| (2..ring.len()).map(|k| orient(ring[0], ring[k - 1], ring[k]).abs()).sum::<f64>())
             .sum()

@@ -120,12 +120,7 @@ impl Facet {
     /// A place of the facet as a receiving point.
     #[must_use]
     pub fn receiving(&self, p: DVec2) -> SurfacePoint {
-        let foot = self.frame.lift(p);
-        let (position, normal) = match &self.smooth {
-            None => (foot, self.frame.normal),
-            Some(smooth) => smooth.at(p).above(foot),
-        };
-        SurfacePoint { position: position + normal * self.lift, normal }
+        SurfacePoint::receiving(&self.frame, self.smooth.as_deref(), p, self.lift)
     }
 
     /// The leaf at `p`, or the nearest one inside the facet's rectangle.

@@ -1,5 +1,6 @@
 //! Geometry that several stages share: frames, boxes, planar polygons.
 pub mod bounds;
+pub mod disjoint;
 pub mod frame;
 pub mod hull;
 pub mod polygon;

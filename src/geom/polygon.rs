@@ -82,6 +82,21 @@ pub fn clip_half_plane(ring: &[DVec2], normal: DVec2, offset: f64) -> Ring {
     out
 }
 
+/// What of a triangle lies in a convex polygon, counter-clockwise: the triangle itself where that is all of it.
+#[must_use]
+pub fn clip_triangle(triangle: [DVec2; 3], outline: &[DVec2]) -> Ring {
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    edges.fold(triangle.to_vec(), |ring, (&a, &b)| {
+        // Inside lies to the left of an edge.
+        let normal = (b - a).perp();
+        if ring.iter().all(|p| normal.dot(*p - a) >= 0.0) {
+            ring
+        } else {
+            clip_half_plane(&ring, normal, normal.dot(a))
+        }
+    })
+}
+
 /// The part of `ring` inside the rectangle from `min` to `max`.
 #[must_use]
 pub fn clip_rectangle(ring: &[DVec2], min: DVec2, max: DVec2) -> Ring {

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use crate::compare::{BakedScene, CompareError};
 use crate::export::COBAKE_LIGHTMAP;
+use crate::geom::disjoint::root;
 use crate::geom::polygon::signed_area;
 use crate::geom::triangle::area;
 use crate::light;
@@ -149,15 +150,6 @@ fn charts<'c>(triangles: impl Iterator<Item = &'c [DVec2; 3]>) -> usize {
         parents[c] = a;
     }
     parents.iter().enumerate().filter(|&(index, &parent)| index == parent).count()
-}
-
-/// The representative of `index`'s group; shortens the way there.
-fn root(parents: &mut [usize], mut index: usize) -> usize {
-    while parents[index] != index {
-        parents[index] = parents[parents[index]];
-        index = parents[index];
-    }
-    index
 }
 
 #[cfg(test)]

@@ -6,8 +6,9 @@ use super::scale::DensityScale;
 use super::view::View;
 use super::{Cell, Colour, INK, Line, MeshDrawing, PictureError, Subject, png};
 use crate::geom::Ring;
+use crate::geom::polygon::clip_triangle;
 use crate::raster::sites;
-use crate::unwrap::{Chart, clip};
+use crate::unwrap::Chart;
 
 /// Texels of the page that no lookup touches.
 const GUTTER: Colour = [24, 24, 28];
@@ -49,7 +50,7 @@ impl<'a> Densities<'a> {
         let mut shares: Vec<(f64, f64, f64)> = Vec::with_capacity(charts.len());
         for (index, chart) in charts.iter().enumerate() {
             let triangles = subject.surfaces[chart.surface].regions.iter().flat_map(|r| &r.triangles);
-            let rings = triangles.map(|&t| clip(t, &chart.outline)).filter(|ring| ring.len() > 2);
+            let rings = triangles.map(|&t| clip_triangle(t, &chart.outline)).filter(|ring| ring.len() > 2);
             let first = pieces.len();
             pieces.extend(rings.map(|ring| Piece { chart: index, ring }));
             let area: f64 = pieces[first..].iter().map(|p| crate::geom::polygon::signed_area(&p.ring)).sum();

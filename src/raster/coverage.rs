@@ -12,9 +12,8 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use crate::geom::Ring;
-use crate::geom::polygon::{nearest_on_segment, orient};
+use crate::geom::polygon::{clip_triangle, nearest_on_segment, orient};
 use crate::surface::Surface;
-use crate::unwrap::clip;
 use crate::unwrap::footprint::{Span, spans};
 use crate::unwrap::{Atlas, Chart};
 
@@ -161,7 +160,7 @@ fn prepare(surface: &Surface, chart: &Chart, size: (u32, u32)) -> TexelChart {
 
 /// What of a triangle with these outer edges lies in a chart's outline, as triangles with theirs. A cut is none.
 fn part_of(triangle: [DVec2; 3], outer: [bool; 3], outline: &Ring) -> Vec<([DVec2; 3], [bool; 3])> {
-    let ring = clip(triangle, outline);
+    let ring = clip_triangle(triangle, outline);
     if ring == triangle {
         return vec![(triangle, outer)];
     }

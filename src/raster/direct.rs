@@ -359,12 +359,7 @@ impl Shining<'_> {
 
     pub(super) fn irradiance(&self, point: DVec2, between: Between, evaluation: &mut Evaluation) -> DVec3 {
         let Surface { frame, smooth, .. } = self.surface;
-        let foot = frame.lift(point);
-        let (position, normal) = match smooth {
-            None => (foot, frame.normal),
-            Some(smooth) => smooth.at(point).above(foot),
-        };
-        let receiver = SurfacePoint { position: position + normal * self.light.tracer.margin(), normal };
+        let receiver = SurfacePoint::receiving(frame, smooth.as_deref(), point, self.light.tracer.margin());
         self.emitter.irradiance(receiver, self.light.tracer, between, evaluation)
     }
 }

@@ -50,10 +50,8 @@ impl Shining<'_> {
     /// What stands before a block that is not behind the emitter.
     pub(super) fn standing_before(&self, block: &Slab, inherited: Option<&[u32]>) -> Standing {
         let tracer = self.light.tracer;
-        let mut between = self.emitter.between(block, tracer, inherited);
-        if let Some(smooth) = &self.surface.smooth {
-            smooth.settle_own(self.emitter.reaches_behind(&self.surface.frame), &mut between);
-        }
+        let Surface { frame, smooth, .. } = self.surface;
+        let between = self.emitter.between(block, (frame, smooth.as_deref()), tracer, inherited);
         if between.is_empty() {
             Standing::Nothing
         } else if self.light.occluders.one_hides(block.corners(), self.emitter, tracer, &between) {

@@ -140,10 +140,7 @@ impl<'a> Receiving<'a> {
         if self.emitter.is_behind(&slab, self.facet.frame.normal, smooth, tracer.margin()) {
             return;
         }
-        let mut between = self.emitter.between(&slab, tracer, inherited);
-        if let Some(smooth) = smooth {
-            smooth.settle_own(self.emitter.reaches_behind(&self.facet.frame), &mut between);
-        }
+        let between = self.emitter.between(&slab, (&self.facet.frame, smooth), tracer, inherited);
         let is_umbra = self.pass.options.umbra_test == Toggle::On
             && !between.is_empty()
             && self.pass.occluders.one_hides(slab.corners(), self.emitter, tracer, &between);

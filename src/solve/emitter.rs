@@ -298,15 +298,24 @@ impl Emitter {
         Shaft::between_slabs(receiver, &shooter, margin)
     }
 
-    /// The triangles that reach into the shaft from `receiver`, ascending. `inherited` holds what reaches
-    /// into a shaft that contains this one: the parent's, handed down.
+    /// The triangles that reach into the shaft from `receiver`, over a plane that may be drawn with smooth normals,
+    /// ascending. `inherited` holds what reaches into a shaft that contains this one: the parent's, handed down.
     #[must_use]
-    pub fn between(&self, receiver: &Slab, tracer: &Tracer, inherited: Option<&[u32]>) -> Vec<u32> {
+    pub fn between(
+        &self,
+        receiver: &Slab,
+        (plane, smooth): (&Frame, Option<&SmoothNormals>),
+        tracer: &Tracer,
+        inherited: Option<&[u32]>,
+    ) -> Vec<u32> {
         let mut between = Vec::new();
         match inherited {
             None => self.shaft(receiver, tracer).gather(tracer, &mut between),
             Some([]) => {}
             Some(list) => self.shaft(receiver, tracer).filter(tracer, list, &mut between),
+        }
+        if let Some(smooth) = smooth {
+            smooth.settle_own(self.reaches_behind(plane), &mut between);
         }
         between
     }
@@ -358,8 +367,7 @@ impl Emitter {
     }
 
     /// Whether some of its light comes from behind a plane.
-    #[must_use]
-    pub fn reaches_behind(&self, plane: &Frame) -> bool {
+    fn reaches_behind(&self, plane: &Frame) -> bool {
         match self {
             Self::Area(area) => area.hull.iter().any(|&q| plane.height(q) < 0.0),
             Self::Punctual(light) => match light.kind {

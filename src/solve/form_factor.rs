@@ -21,7 +21,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
+
+use crate::geom::Frame;
+use crate::surface::SmoothNormals;
 
 /// A point on a surface together with the side it faces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +33,20 @@ pub struct SurfacePoint {
     pub position: DVec3,
     /// Outward normal, unit length.
     pub normal: DVec3,
+}
+
+impl SurfacePoint {
+    /// Where light is received for place `p` of a plane, or of the curved surface that `smooth` tells of, `lift`
+    /// metres off it.
+    #[must_use]
+    pub fn receiving(plane: &Frame, smooth: Option<&SmoothNormals>, p: DVec2, lift: f64) -> Self {
+        let foot = plane.lift(p);
+        let (position, normal) = match smooth {
+            None => (foot, plane.normal),
+            Some(smooth) => smooth.at(p).above(foot),
+        };
+        Self { position: position + normal * lift, normal }
+    }
 }
 
 /// The unoccluded form factor from `receiver` to `polygon`, in `[0, 1]`.

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use super::footprint::spans;
 use super::{Atlas, Block};
 use crate::authored::Authored;
+use crate::geom::disjoint::root;
 use crate::scene::Scene;
 use crate::surface::Surface;
 
@@ -18,6 +19,9 @@ pub fn shared_texels(
     (authored, scene): (&Authored, &Scene),
     atlas: &Atlas,
 ) -> u64 {
+    if blocks.is_empty() {
+        return 0;
+    }
     let members: Vec<usize> = blocks.iter().flat_map(|b| b.members.iter().map(|m| m.surface)).collect();
     let island = islands(&members, surfaces, (authored, scene));
     // 0 nobody, 1 more than one, else the island's number and 2.
@@ -62,13 +66,4 @@ fn islands(members: &[usize], surfaces: &[Surface], (authored, scene): (&Authore
         }
     }
     (0..surfaces.len()).map(|surface| root(&mut island, surface)).collect()
-}
-
-/// The least member of the set that `member` belongs to; halves the way there.
-fn root(parents: &mut [usize], mut member: usize) -> usize {
-    while parents[member] != member {
-        parents[member] = parents[parents[member]];
-        member = parents[member];
-    }
-    member
 }

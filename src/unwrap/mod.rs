@@ -31,8 +31,8 @@ mod xatlas;
 pub use block::{Block, Member, blocks};
 pub use error::UnwrapError;
 pub use islands::shared_texels;
+pub(crate) use part::area_within;
 pub use part::{Part, whole};
-pub(crate) use part::{area_within, clip};
 
 use std::ops::Range;
 

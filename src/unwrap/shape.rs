@@ -2,9 +2,9 @@
 
 use glam::DVec2;
 
-use super::part::{Part, clip};
+use super::part::Part;
 use crate::geom::Ring;
-use crate::geom::polygon::orient;
+use crate::geom::polygon::{clip_triangle, orient};
 use crate::surface::Surface;
 
 /// The outline of a surface's part in the surface's plane, metres.
@@ -32,7 +32,7 @@ impl Shape {
         let whole = surface.regions.iter().flat_map(|r| r.triangles.iter().copied());
         let triangles: Vec<[DVec2; 3]> = whole
             .flat_map(|t| {
-                let ring = clip(t, &part.outline);
+                let ring = clip_triangle(t, &part.outline);
                 (2..ring.len()).map(move |k| [ring[0], ring[k - 1], ring[k]]).collect::<Vec<_>>()
             })
             .collect();

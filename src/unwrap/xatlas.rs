@@ -22,6 +22,7 @@ use xatlas_rs::{ChartOptions, IndexData, MeshData, PackOptions, UvMeshDecl};
 use super::footprint::{Span, spans};
 use super::pack::{Packer, Page, Place, SizedShape, Turn};
 use super::shape::Shape;
+use crate::geom::disjoint::root;
 use crate::geom::polygon::orient;
 
 /// A chart that fills more of its bounding rectangle goes in as that rectangle.
@@ -263,17 +264,10 @@ fn conforming(triangles: &[[DVec2; 3]]) -> Option<Outline> {
 /// Whether one can walk from every triangle to every other over shared corners.
 fn is_connected(outline: &Outline) -> bool {
     let mut parents: Vec<usize> = (0..outline.corners.len()).collect();
-    let find = |parents: &mut Vec<usize>, mut k: usize| {
-        while parents[k] != k {
-            parents[k] = parents[parents[k]];
-            k = parents[k];
-        }
-        k
-    };
     let mut parts = outline.corners.len();
     for t in &outline.triangles {
         for (a, b) in [(t[0], t[1]), (t[1], t[2])] {
-            let (a, b) = (find(&mut parents, a as usize), find(&mut parents, b as usize));
+            let (a, b) = (root(&mut parents, a as usize), root(&mut parents, b as usize));
             if a != b {
                 parents[a] = b;
                 parts -= 1;
