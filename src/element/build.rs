@@ -271,6 +271,7 @@ impl Facet {
             indirect: Shading::default(),
             is_uneven: false,
             is_enclosed: false,
+            overhang: None,
         });
         Some((self.elements.len() - 1) as u32)
     }

@@ -24,6 +24,7 @@ pub use facet::{Facet, Sample, Side};
 use crate::cob::Cob;
 use crate::geom::Ring;
 use crate::geom::polygon::rectangle;
+use crate::solve::overhang::Overhang;
 
 /// Marks an absent parent or child.
 pub const NONE: u32 = u32::MAX;
@@ -62,6 +63,8 @@ pub struct Element {
     pub is_uneven: bool,
     /// Whether it lies in a narrow gap, as reflected light was gathered last.
     pub is_enclosed: bool,
+    /// What hangs closely over a part of it, if it is too small to be split for that.
+    pub overhang: Option<Overhang>,
 }
 
 /// Light over an element's rectangle.

@@ -18,7 +18,7 @@ impl Round {
     /// The first shows the last how light varies within patches.
     #[must_use]
     pub fn first(error: f64) -> Self {
-        Self { noise: 4.0 * error, tolerance: 12.0 * error }
+        Self { noise: 4.0 * error, tolerance: 6.0 * error }
     }
 
     /// Follows light into narrow gaps, from one side to the other, after another round: elements stay as they are.
@@ -40,17 +40,52 @@ impl Round {
     }
 }
 
+/// Rays of an element go with its area to this power, for all errors together to be least: an error that falls with
+/// the power 3/4 of the rays, squared, times the area.
+const RAYS_BY_AREA: f64 = 0.4;
+
+/// The error that calls for a split goes with the inverse of an element's side to this power.
+const TOLERANCE_BY_SIZE: f64 = 0.5;
+
+/// What of an element's error is let pass, in multiples of a [`Round`]'s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leniency {
+    /// That rays leave.
+    pub noise: f64,
+    /// In the middle.
+    pub tolerance: f64,
+}
+
+impl Leniency {
+    /// None.
+    pub const NONE: Self = Self { noise: 1.0, tolerance: 1.0 };
+
+    /// For an element whose side is this many times as long as a patch's: the error on a small one is an error on few
+    /// texels, and costs as much to mend. Half a patch has the round's.
+    #[must_use]
+    pub fn for_size(size: f64) -> Self {
+        let smaller = 0.5 / size;
+        Self {
+            noise: smaller.powf(2.0 * RAYS_BY_AREA * 0.75).clamp(1.0, 2.8),
+            tolerance: smaller.powf(TOLERANCE_BY_SIZE).clamp(0.5, 4.0),
+        }
+    }
+}
+
 /// The greatest error that is left where nobody says how much may be, as a fraction of the light.
 pub const COARSEST: f64 = 0.008;
+
+/// An error below this fraction of the greatest asks for another round before the last.
+pub const MUCH_FINER: f64 = 0.25;
 
 /// The least, likewise: an eye sees no less, and lightmaps interpolate no better.
 const FINEST: f64 = 0.0015;
 
 /// An error below the greatest costs no more rays than this, some two seconds of one core,
-const AFFORDABLE_RAYS: f64 = 1.2e7;
+const AFFORDABLE_RAYS: f64 = 1e7;
 
-/// and this many for each texel, since more texels show more of it, until these have doubled the former.
-const AFFORDABLE_RAYS_A_TEXEL: f64 = 50.0;
+/// and this many for each texel, since more texels show more of it.
+const AFFORDABLE_RAYS_A_TEXEL: f64 = 100.0;
 
 /// The number of places grows with this power of the tolerance's inverse.
 const GROWTH: f64 = 0.4;
@@ -59,7 +94,7 @@ const GROWTH: f64 = 0.4;
 /// `texels`, told by the `places` of a `round` before.
 #[must_use]
 pub fn affordable_error(places: &Contrasts, round: Round, texels: f64) -> f64 {
-    let affordable = AFFORDABLE_RAYS + (AFFORDABLE_RAYS_A_TEXEL * texels).min(AFFORDABLE_RAYS);
+    let affordable = AFFORDABLE_RAYS + AFFORDABLE_RAYS_A_TEXEL * texels;
     let rays = |last: Round| (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise);
     let steps = 32;
     let error = |step: i32| FINEST * (COARSEST / FINEST).powf(f64::from(step) / f64::from(steps));
@@ -125,9 +160,26 @@ mod tests {
     #[test]
     fn the_affordable_error_costs_no_more_than_said() {
         let (places, round) = (places(10_000, 0.5), Round::first(0.004));
-        let last = Round::last(affordable_error(&places, round, 1e9));
-        let rays = (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise);
-        assert!(rays <= 2.0 * AFFORDABLE_RAYS && rays > 0.4 * AFFORDABLE_RAYS, "{rays}");
+        let rays = |texels: f64| {
+            let last = Round::last(affordable_error(&places, round, texels));
+            (round.tolerance / last.tolerance).powf(GROWTH) * places.rays(last.noise)
+        };
+        for (texels, most) in [(0.0, AFFORDABLE_RAYS), (AFFORDABLE_RAYS / AFFORDABLE_RAYS_A_TEXEL, 2e7)] {
+            let rays = rays(texels);
+            assert!(rays <= most && rays > 0.3 * most, "{rays} of {most}");
+        }
+    }
+
+    /// A quarter of the side is a sixteenth of the area: a third of the rays, and twice the tolerance.
+    #[test]
+    fn small_elements_are_let_pass_more() {
+        let [half, eighth] = [0.5, 0.125].map(Leniency::for_size);
+        assert_eq!(half, Leniency::NONE);
+        assert!((eighth.tolerance - 2.0).abs() < 1e-9, "{eighth:?}");
+        assert!((eighth.noise.powf(-4.0 / 3.0) - 16_f64.powf(-RAYS_BY_AREA)).abs() < 1e-9, "{eighth:?}");
+        let (least, most) = (Leniency::for_size(10.0), Leniency::for_size(1e-9));
+        assert!(least.noise == 1.0 && least.tolerance == 0.5, "{least:?}");
+        assert!(most.noise < 3.0 && most.tolerance <= 4.0, "{most:?}");
     }
 
     #[test]

@@ -33,6 +33,15 @@ const ALONG_EDGE: f64 = 0.95;
 #[derive(Default)]
 pub struct Nearby(Vec<u32>);
 
+/// A place that something hangs over.
+#[derive(Clone, Copy, Debug)]
+pub struct Covered {
+    /// Plane coordinates.
+    pub place: DVec2,
+    /// Of what hangs over it where it is lowest, metres.
+    pub height: f64,
+}
+
 /// A place beside the foot of something upright.
 #[derive(Clone, Copy, Debug)]
 pub struct BrightFoot {
@@ -61,12 +70,12 @@ impl Nearby {
         })
     }
 
-    /// The middle of what covers `element` most closely; plane coordinates.
+    /// The middle of what covers `element` most closely.
     #[must_use]
-    pub fn most_covered(&self, tracer: &Tracer, facet: &Facet, element: u32) -> Option<DVec2> {
+    pub fn most_covered(&self, tracer: &Tracer, facet: &Facet, element: u32) -> Option<Covered> {
         let e = &facet.elements[element as usize];
         let area = (e.max - e.min).element_product();
-        let mut most: Option<(f64, DVec2)> = None;
+        let mut most: Option<(f64, Covered)> = None;
         for (_, corners) in self.triangles(tracer, facet) {
             let (cover, lowest) = cover(corners, (e.min.extend(tracer.margin()), e.max.extend(e.size())));
             let covered = signed_area(&cover).abs();
@@ -76,10 +85,10 @@ impl Nearby {
             let middle = cover.iter().sum::<DVec2>() / cover.len() as f64;
             let closeness = covered / lowest;
             if most.is_none_or(|(best, _)| closeness > best) && facet.contains(element, middle) {
-                most = Some((closeness, middle));
+                most = Some((closeness, Covered { place: middle, height: lowest }));
             }
         }
-        most.map(|(_, p)| p)
+        most.map(|(_, covered)| covered)
     }
 
     /// The place on `element` beside the foot of what is upright and gives the most there. `radiosity` tells the

@@ -52,6 +52,8 @@ pub struct DirectPass<'a> {
     pub threshold: f64,
     /// The same for reflected light.
     pub indirect_threshold: f64,
+    /// Longest side of a patch, metres.
+    pub patch_size: f64,
     /// Mean irradiance that the emitters would give if they shone evenly: what counts as dim.
     pub typical: f64,
 }

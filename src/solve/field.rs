@@ -19,6 +19,9 @@ use crate::trace::{Hit, Tracer};
 /// About this many cells stand for each leaf.
 const CELLS_A_LEAF: f64 = 4.0;
 
+/// Surfaces face each other across a gap where the cosine between their normals is less than this.
+const FACING: f64 = -0.7;
+
 /// Set in the number of a leaf, which is that of its patch; the others number nodes.
 const LEAF: u32 = 1 << 31;
 
@@ -69,6 +72,8 @@ struct FieldPatch {
     corners: [Vec3; 4],
     /// As of [`Shading`](crate::element::Shading).
     bulge: Vec3,
+    /// What faces it from no farther than this is in a gap that it does not shine into, metres.
+    gap: f32,
 }
 
 impl<'a> RadiosityField<'a> {
@@ -212,26 +217,39 @@ impl<'a> RadiosityField<'a> {
     }
 
     /// The radiosity that a ray met at `point`; zero on the back of a single-sided surface.
-    #[inline]
     #[must_use]
     pub fn radiosity(&self, tracer: &Tracer, hit: &Hit, point: DVec3) -> Vec3 {
+        self.patch_met(tracer, hit, point).map_or(Vec3::ZERO, |(_, patch, p)| patch.at(p))
+    }
+
+    /// The radiosity that a ray met, seen from a place with this normal: zero where it did not leave
+    /// [the gap](super::overhang) between the two.
+    #[inline]
+    #[must_use]
+    pub fn radiosity_seen(&self, tracer: &Tracer, (hit, point): (&Hit, DVec3), normal: DVec3) -> Vec3 {
+        let Some((side, patch, p)) = self.patch_met(tracer, hit, point) else { return Vec3::ZERO };
+        if hit.distance < f64::from(patch.gap) && side.frame.normal.dot(normal) < FACING {
+            return Vec3::ZERO;
+        }
+        patch.at(p)
+    }
+
+    /// The patch that a ray met, on which side of its surface, and where on that.
+    #[inline]
+    fn patch_met(&self, tracer: &Tracer, hit: &Hit, point: DVec3) -> Option<(&SideField, &FieldPatch, Vec2)> {
         let surface = self.locator.surface_of(hit.triangle) as usize;
-        let Some(side) = self.sides.get(2 * surface + usize::from(hit.from_behind)) else {
-            return Vec3::ZERO;
-        };
+        let side = self.sides.get(2 * surface + usize::from(hit.from_behind))?;
         if side.cells.x == 0 {
-            return Vec3::ZERO;
+            return None;
         }
         let p = (side.frame.project(point) - side.min).as_vec2();
         let cell = (p * side.cells_per_metre).max(Vec2::ZERO).as_uvec2().min(side.cells - 1);
         let mut at = self.starts[(side.first + cell.y * side.cells.x + cell.x) as usize];
         if at == SHARED {
-            match self.locator.find(tracer, hit, point) {
-                Some((facet, _)) => at = self.roots[facet],
-                None => return Vec3::ZERO,
-            }
+            let (facet, _) = self.locator.find(tracer, hit, point)?;
+            at = self.roots[facet];
         }
-        self.patches[self.patch_from(at, p) as usize].at(p)
+        Some((side, &self.patches[self.patch_from(at, p) as usize], p))
     }
 }
 
@@ -318,6 +336,7 @@ impl FieldPatch {
             per_size: (1.0 / (e.max - e.min)).as_vec2(),
             bulge: (middle - 0.25 * corners.iter().sum::<DVec3>()).as_vec3(),
             corners: corners.map(|c| c.as_vec3()),
+            gap: e.overhang.map_or(0.0, |overhang| overhang.reach as f32),
         }
     }
 

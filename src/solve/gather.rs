@@ -15,14 +15,15 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::budget::{Contrasts, Round, level_for};
-use super::contact::Nearby;
+use super::budget::{Contrasts, Leniency, Round, level_for};
+use super::contact::{Covered, Nearby};
 use super::direct::DirectPass;
 use super::emitter::{Evaluation, Precision, irradiance_by_rays};
 use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
 use super::hemisphere::{Directions, Level};
 use super::hot::HotSpot;
+use super::overhang::{CLOSE, Overhang};
 use super::patches::Receiver;
 use crate::element::{Facet, Shading};
 use crate::geom::Frame;
@@ -30,8 +31,11 @@ use crate::light::luminance;
 use crate::options::Refine;
 use crate::trace::{FanStack, Hit};
 
-/// In the dark, errors are measured by this fraction of the scene's mean light.
-pub(super) const LEAST_REFERENCE: f64 = 0.5;
+/// In the dark, errors are measured by this fraction of the scene's mean light,
+const LEAST_REFERENCE: f64 = 0.5;
+
+/// and where it is bright by no more than this many times as much.
+const MOST_REFERENCE: f64 = 3.0;
 
 /// Where surfaces are nearer than the element is large, this share of the difference between the samples and
 /// the middle counts as error: the interpolation of an edge can be right in the middle by chance.
@@ -60,9 +64,33 @@ const HOT_NEGLIGIBLE: f64 = 2e-5;
 /// A place of which more than this share of the rays meets something within the receiver's reach is in a gap.
 const ENCLOSED: f64 = 0.75;
 
+/// Where light goes to and fro, an error counts as many times as it is reflected, but no more than the inverse of this.
+const LEAST_KEPT: f64 = 0.1;
+
 /// Rounds in a row in which light in a gap may stay as it is before it counts as settled: it comes to one side by
 /// way of the other.
 const PATIENCE: u32 = 2;
+
+/// Least and most light that errors are measured by.
+#[derive(Clone, Copy, Debug)]
+pub struct References {
+    least: f64,
+    most: f64,
+}
+
+/// Those of a scene with this mean light.
+#[must_use]
+pub fn references(typical: f64) -> References {
+    References { least: LEAST_REFERENCE * typical, most: MOST_REFERENCE * typical }
+}
+
+impl References {
+    /// What an error is measured by where there is so much light.
+    #[must_use]
+    pub fn nearest(&self, light: f64) -> f64 {
+        light.max(self.least).min(self.most)
+    }
+}
 
 /// What gathering took.
 #[derive(Clone, Copy, Debug, Default)]
@@ -121,6 +149,7 @@ pub fn gather(
                 pass,
                 source,
                 round,
+                contrast: 0.0,
                 level: Level::LEAST,
                 receiver: Receiver { element: 0, contrast: 0.0, reach: 0.0, idle: 0 },
                 unsettled,
@@ -134,10 +163,7 @@ pub fn gather(
             };
             for receiver in receivers {
                 gathering.receiver = *receiver;
-                gathering.level = level_for(receiver.contrast, round.noise);
-                let before = gathering.counts.places;
                 gathering.receive(receiver.element);
-                gathering.counts.contrasts.add(receiver.contrast, gathering.counts.places - before);
             }
             gathering.counts.rays += gathering.evaluation.effort.rays;
             (gathering.counts, gathering.enclosed)
@@ -153,7 +179,9 @@ struct Gathering<'a> {
     pass: &'a DirectPass<'a>,
     source: Source<'a>,
     round: Round,
-    /// How many of the directions a place takes.
+    /// What an error counts for the element at hand: the contrast of what it sees, and how many of the directions
+    /// its places take for that.
+    contrast: f64,
     level: Level,
     /// Where the elements at hand began.
     receiver: Receiver,
@@ -184,8 +212,16 @@ impl Gathering<'_> {
     fn receive(&mut self, element: u32) {
         let e = &self.facet.elements[element as usize];
         let size = e.size();
+        self.contrast = self.receiver.contrast / self.leniency(element).noise;
+        self.level = level_for(self.contrast, self.round.noise);
         if size <= self.least(element) {
-            let gathered = self.at(self.facet.centre(element));
+            if self.round.splits() {
+                let overhang = Overhang::over(self.pass.tracer, self.facet, element);
+                self.facet.elements[element as usize].overhang = overhang;
+            }
+            let e = &self.facet.elements[element as usize];
+            let place = e.overhang.map_or(e.centroid, |overhang| overhang.open);
+            let gathered = self.at(self.facet.receiving(place));
             let shading = Shading { corners: [gathered.irradiance; 4], bulge: DVec3::ZERO };
             self.keep(element, shading, gathered.is_enclosed);
             return;
@@ -267,7 +303,9 @@ impl Gathering<'_> {
             let differences = values.iter().map(|v| luminance((*v - middle.irradiance).abs()));
             error = differences.map(|d| NEAR_SHARE * d).fold(error, f64::max);
         }
-        error > self.tolerated(element, e.centroid, middle.irradiance)
+        // Light that dies away in a gap is convex: interpolation adds to it at every reflection anew.
+        let kept = if middle.is_enclosed { (1.0 - luminance(e.reflectance)).max(LEAST_KEPT) } else { 1.0 };
+        error > kept * self.tolerated(element, e.centroid, middle.irradiance)
     }
 
     /// Whether something stands close over the element, or on it, where its light is not what `shading` says.
@@ -275,21 +313,28 @@ impl Gathering<'_> {
         let tracer = self.pass.tracer;
         self.nearby.look(tracer, self.facet, element);
         let covered = self.nearby.most_covered(tracer, self.facet, element);
-        if covered.is_some_and(|p| self.is_missed_at(p, element, shading)) {
-            return true;
+        if let Some(Covered { place, height }) = covered {
+            // What is gathered in a gap is the light that it was thought to have. It is dark there.
+            let is_close = height < CLOSE * self.facet.elements[element as usize].size();
+            let light = if is_close { DVec3::ZERO } else { self.at(self.facet.receiving(place)).irradiance };
+            if self.is_missed_at(place, element, shading, light) {
+                return true;
+            }
         }
         let field = self.source.field;
         let reflected = |hit: &Hit, at| luminance(field.radiosity(tracer, hit, at).as_dvec3());
         let foot = self.nearby.brightest_foot(tracer, self.facet, element, reflected);
         foot.is_some_and(|foot| {
             let e = &self.facet.elements[element as usize];
-            foot.gives > self.tolerated(element, foot.place, shading.at(e.place(foot.place)))
-                && self.is_missed_at(foot.place, element, shading)
+            foot.gives > self.tolerated(element, foot.place, shading.at(e.place(foot.place))) && {
+                let light = self.at(self.facet.receiving(foot.place)).irradiance;
+                self.is_missed_at(foot.place, element, shading, light)
+            }
         })
     }
 
-    fn is_missed_at(&mut self, p: DVec2, element: u32, shading: &Shading) -> bool {
-        let gathered = self.at(self.facet.receiving(p)).irradiance;
+    /// Whether `shading` is not the light that was `gathered` at a place of an element.
+    fn is_missed_at(&self, p: DVec2, element: u32, shading: &Shading, gathered: DVec3) -> bool {
         let shading = shading.at(self.facet.elements[element as usize].place(p));
         luminance((shading - gathered).abs()) > self.tolerated(element, p, gathered)
     }
@@ -297,8 +342,16 @@ impl Gathering<'_> {
     /// The error that is tolerated at a place of an element.
     fn tolerated(&self, element: u32, p: DVec2, gathered: DVec3) -> f64 {
         let (direct, _) = self.facet.received(element, p);
-        let light = luminance(direct + gathered);
-        self.round.tolerance * light.max(LEAST_REFERENCE * self.pass.typical)
+        let light = references(self.pass.typical).nearest(luminance(direct + gathered));
+        self.leniency(element).tolerance * self.round.tolerance * light
+    }
+
+    /// An error that was asked for holds everywhere.
+    fn leniency(&self, element: u32) -> Leniency {
+        match self.pass.options.gather_error {
+            Some(_) => Leniency::NONE,
+            None => Leniency::for_size(self.facet.elements[element as usize].size() / self.pass.patch_size),
+        }
     }
 
     /// An element no larger than this is not split, metres.
@@ -378,7 +431,7 @@ impl Gathering<'_> {
         let (reach, surface) = (self.receiver.reach, self.facet.surface);
         let Source { field, hot_spots, .. } = self.source;
         tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at, share| {
-            sum += share * field.radiosity(tracer, hit, at).as_dvec3();
+            sum += share * field.radiosity_seen(tracer, (hit, at), normal).as_dvec3();
             if smooth.is_some() && field.is_of(hit, surface) {
                 return; // a facet of a hollow: so near that it would tell nothing of what else is about
             }
@@ -387,6 +440,7 @@ impl Gathering<'_> {
         });
         let rays = self.level.rays() as f64;
         self.counts.places += 1;
+        self.counts.contrasts.add(self.contrast, 1);
         self.counts.rays += self.level.rays() as u64;
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
         let spots = hot_spots.iter().map(|s| (&s.emitter, || s.exitance_at(point.position, field)));

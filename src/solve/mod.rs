@@ -18,6 +18,7 @@ pub mod gather;
 pub mod hemisphere;
 pub mod hot;
 pub mod locate;
+pub mod overhang;
 pub mod patches;
 pub mod sequence;
 pub mod umbra;
@@ -31,11 +32,11 @@ use crate::options::BakeOptions;
 use crate::scene::PunctualLight;
 use crate::surface::Surface;
 use crate::trace::Tracer;
-use budget::{COARSEST, Round, affordable_error};
+use budget::{COARSEST, MUCH_FINER, Round, affordable_error};
 use direct::{DirectPass, ShotCounts};
 use emitter::Emitter;
 use field::RadiosityField;
-use gather::{GatherCounts, Source, gather};
+use gather::{GatherCounts, Source, gather, references};
 use hemisphere::Directions;
 use hot::HotSpots;
 use locate::FacetLocator;
@@ -115,6 +116,7 @@ pub fn solve(
         options: problem.options,
         threshold: problem.threshold,
         indirect_threshold: problem.indirect_threshold,
+        patch_size: problem.patch_size,
         typical: typical_irradiance(&glowing, &lights, &facets, tracer.diagonal()),
     };
     let mut direct = ShotCounts::default();
@@ -186,7 +188,7 @@ fn gather_reflected(
     patches.spread_indirect(facets, pass.tracer.diagonal() * 1e-6);
     let direct_scale = patches.direct_scale(received);
     let hot = HotSpots::find(patches, facets);
-    let receivers = patches.receivers(facets, gather::LEAST_REFERENCE * pass.typical, &hot);
+    let receivers = patches.receivers(facets, references(pass.typical), &hot);
     let directions = Directions::prepare();
     let mut counts = GatherCounts::default();
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
@@ -227,13 +229,14 @@ fn gather_reflected(
         None => {
             let mut round = Round::first(COARSEST);
             let mut error = affordable_error(&approach(round, 0.75, facets)?, round, texels);
-            if error < 0.5 * COARSEST {
+            if error < MUCH_FINER * COARSEST {
                 round = Round::first(error);
                 error = affordable_error(&approach(round, 0.8, facets)?, round, texels);
             }
             error
         }
     };
+    tracing::debug!(error, "affordable");
     counts.add(&gather_from(&receivers, (Round::last(error), ANY), facets).0);
     if !progress(1.0) {
         return None;

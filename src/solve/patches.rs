@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::exchange::Exchange;
+use super::gather::References;
 use super::hot::{HotSpots, reflected};
 use super::locate::FacetLocator;
 use crate::element::{Element, Facet, Shading, Side};
@@ -101,10 +102,10 @@ impl Patches {
     }
 
     /// For each facet its patches' elements, with the standard deviation of the luminance that a ray from there
-    /// meets as a fraction of the light there, but not less than `least`.
+    /// meets as a fraction of the light there, or what of `references` is nearest.
     /// What `hot` spots reflect beyond their cap does not count.
     #[must_use]
-    pub fn receivers(&self, facets: &[Facet], least: f64, hot: &HotSpots) -> Vec<Vec<Receiver>> {
+    pub fn receivers(&self, facets: &[Facet], references: References, hot: &HotSpots) -> Vec<Vec<Receiver>> {
         let is_hot = hot.leaves(facets);
         let moments: Vec<(f64, f64)> =
             self.patches.par_iter().map(|p| reflected_moments(facets, p, &is_hot, hot.cap)).collect();
@@ -117,7 +118,7 @@ impl Patches {
                 square += share * moments[other].1;
             }
             let deviation = (square - mean * mean).max(0.0).sqrt();
-            let light = luminance(patch.direct + patch.indirect).max(least);
+            let light = references.nearest(luminance(patch.direct + patch.indirect));
             let contrast = if light > 0.0 { deviation / light } else { 0.0 };
             let size = facets[patch.facet as usize].elements[patch.element as usize].size();
             receivers[patch.facet as usize].push(Receiver {
