@@ -7,6 +7,7 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::lines::KnownLine;
 use super::survey::Surveys;
 use super::{Cell, DensityOptions, LEVELS, SurfaceSurvey};
 use crate::geom::polygon::{clip_triangle, orient, rectangle};
@@ -15,6 +16,12 @@ use crate::unwrap::Part;
 
 /// Cuts that are tried along each side of a part, at most.
 const CUTS: usize = 24;
+
+/// Known lines that are tried along each side, at most.
+const KNOWN_CUTS: usize = 12;
+
+/// Other cuts that come closer to a known line than this fraction of the way between two of them are left out.
+const LEAST_APART: f64 = 0.02;
 
 /// Cuts into cuts.
 const DEEPEST: u32 = 24;
@@ -218,7 +225,8 @@ impl<'a> Cutter<'a> {
     fn best_cut(&self, (min, max): (DVec2, DVec2), cells: &[&Cell], limit: f64) -> Option<(usize, f64)> {
         let mut best: Option<(f64, usize, f64)> = None;
         for axis in 0..2 {
-            let lines = self.lines(axis, (min[axis], max[axis]));
+            let known = known_lines(axis, (min, max), cells);
+            let lines = self.lines(axis, (min[axis], max[axis]), &known);
             if lines.is_empty() {
                 continue;
             }
@@ -238,14 +246,20 @@ impl<'a> Cutter<'a> {
                     slab.add(cell, low, high);
                 }
             }
+            // What breaks where two of them meet is in neither.
+            let mut breaks = vec![Sum::default(); edges.len()];
+            for line in &known {
+                let at = edges.partition_point(|&e| e < line.at);
+                cells.iter().for_each(|cell| breaks[at].add_line(cell, line, (min, max)));
+            }
             let mut below = vec![slabs[0]];
-            for slab in &slabs[1..] {
-                let sum = below[below.len() - 1].and(slab);
+            for (slab, at_edge) in slabs.iter().zip(&breaks).skip(1) {
+                let sum = below[below.len() - 1].and(at_edge).and(slab);
                 below.push(sum);
             }
             let mut above = Sum::default();
             for k in (0..lines.len()).rev() {
-                above = slabs[k + 1].and(&above);
+                above = slabs[k + 1].and(&breaks[k + 2]).and(&above);
                 let (mut low_max, mut high_min) = (max, min);
                 (low_max[axis], high_min[axis]) = (lines[k], lines[k]);
                 let cost =
@@ -258,8 +272,9 @@ impl<'a> Cutter<'a> {
         best.map(|(_, axis, at)| (axis, at))
     }
 
-    /// Where a stretch may be cut: at the surveyed cells' dyadic edges, as fine as leaves not too many of them.
-    fn lines(&self, axis: usize, (low, high): (f64, f64)) -> Vec<f64> {
+    /// Where a stretch may be cut: at the `known` lines, and at the surveyed cells' dyadic edges, as fine as leaves not
+    /// too many of them.
+    fn lines(&self, axis: usize, (low, high): (f64, f64), known: &[KnownLine]) -> Vec<f64> {
         let (origin, base) = (self.survey.min[axis], self.survey.base[axis]);
         let mut step = base;
         while (high - low) / step < 0.5 * CUTS as f64 && step > base * 0.5_f64.powi(LEVELS as i32 - 4) {
@@ -272,7 +287,11 @@ impl<'a> Cutter<'a> {
         };
         let first = ((low - origin) / step + 0.01).floor() as i64 + 1;
         let last = ((high - origin) / step - 0.01).ceil() as i64 - 1;
-        (first..=last).map(|k| origin + k as f64 * step).collect()
+        let is_apart = |p: &f64| known.iter().all(|line| (line.at - p).abs() > LEAST_APART * step);
+        let dyadic = (first..=last).map(|k| origin + k as f64 * step).filter(is_apart);
+        let mut lines: Vec<f64> = dyadic.chain(known.iter().map(|line| line.at)).collect();
+        lines.sort_by(f64::total_cmp);
+        lines
     }
 
     /// A rectangle as one part, at its best spacing.
@@ -346,6 +365,43 @@ struct Sum {
     levels: [usize; 2],
 }
 
+/// The known lines across a rectangle that the most error is due to, one for each place along the axis.
+fn known_lines(axis: usize, (min, max): (DVec2, DVec2), cells: &[&Cell]) -> Vec<KnownLine> {
+    let mut found: Vec<(f64, KnownLine)> = Vec::new();
+    for cell in cells.iter().filter(|cell| !cell.lines.is_empty()) {
+        let area = (cell.max.min(max) - cell.min.max(min)).max(DVec2::ZERO).element_product();
+        let rows = cell.energy[axis].iter().zip(&cell.smooth[axis]);
+        let due = area * rows.map(|(&whole, &smooth)| f64::from(whole - smooth).max(0.0)).sum::<f64>();
+        if due == 0.0 {
+            continue;
+        }
+        for line in cell.lines.iter().filter(|line| line.cuts(axis, (min[axis], max[axis]))) {
+            let due = due * share(cell, axis, |other| other == line);
+            match found.iter_mut().find(|(_, known)| known.at == line.at) {
+                Some((sum, _)) => *sum += due,
+                None => found.push((due, *line)),
+            }
+        }
+    }
+    found.retain(|(due, _)| *due > 0.0);
+    found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.at.total_cmp(&b.1.at)));
+    found.truncate(KNOWN_CUTS);
+    found.into_iter().map(|(_, line)| line).collect()
+}
+
+/// The share of a cell's lines along one axis that are meant; all are thought to be alike.
+fn share(cell: &Cell, axis: usize, is_meant: impl Fn(&KnownLine) -> bool) -> f64 {
+    let beside = |line: &&KnownLine| {
+        line.axis == axis && line.from < cell.max[1 - axis] && line.to > cell.min[1 - axis]
+    };
+    let (mut all, mut meant) = (0_u32, 0_u32);
+    for line in cell.lines.iter().filter(beside) {
+        all += 1;
+        meant += u32::from(is_meant(line));
+    }
+    if all == 0 { 1.0 } else { f64::from(meant) / f64::from(all) }
+}
+
 impl Default for Sum {
     fn default() -> Self {
         Self { min: DVec2::INFINITY, max: DVec2::NEG_INFINITY, energy: Default::default(), levels: [0; 2] }
@@ -370,8 +426,22 @@ impl Sum {
         self.levels = [0, 1].map(|axis| self.levels[axis].max(cell.levels[axis]));
         self.min = self.min.min(low);
         self.max = self.max.max(high);
-        for (sum, row) in self.energy.iter_mut().flatten().zip(cell.energy.iter().flatten()) {
-            *sum += area * f64::from(*row);
+        for axis in 0..2 {
+            let broken = share(cell, axis, |line| line.cuts(axis, (min[axis], max[axis])));
+            let rows = cell.energy[axis].iter().zip(&cell.smooth[axis]);
+            for (sum, (&whole, &smooth)) in self.energy[axis].iter_mut().zip(rows) {
+                *sum += area * (f64::from(smooth) + broken * f64::from(whole - smooth));
+            }
+        }
+    }
+
+    /// Adds what of a cell's error is due to a line, from `min` to `max`.
+    fn add_line(&mut self, cell: &Cell, line: &KnownLine, (min, max): (DVec2, DVec2)) {
+        let area = (cell.max.min(max) - cell.min.max(min)).max(DVec2::ZERO).element_product();
+        let area = area * share(cell, line.axis, |other| other == line);
+        let rows = cell.energy[line.axis].iter().zip(&cell.smooth[line.axis]);
+        for (sum, (&whole, &smooth)) in self.energy[line.axis].iter_mut().zip(rows) {
+            *sum += area * f64::from(whole - smooth);
         }
     }
 

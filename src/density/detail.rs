@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::lines::KnownLine;
 use crate::raster::PointLight;
 
 /// The mean square of a hat of height 1 over its support.
@@ -11,13 +12,28 @@ const HAT: f64 = 1.0 / 3.0;
 pub(super) struct Grid<'a> {
     pub cells: [usize; 2],
     pub light: &'a [Option<PointLight>],
+    /// Lines along which light breaks off, in cells from the first node.
+    pub lines: &'a [KnownLine],
 }
+
+/// What finer samples tell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Change {
+    /// In all.
+    pub whole: f64,
+    /// Beside the known lines: what is left if charts end there.
+    pub smooth: f64,
+}
+
+/// What is this close to a line, in cells, is on it.
+const ON_LINE: f64 = 1e-6;
 
 impl Grid<'_> {
     /// Mean squared error of linear interpolation between nodes `2 × step` cells apart along `axis`, told
     /// from the nodes between them, in the cells from `low` to `high`.
-    pub(super) fn energy(&self, axis: usize, step: usize, low: [usize; 2], high: [usize; 2]) -> f64 {
+    pub(super) fn energy(&self, axis: usize, step: usize, low: [usize; 2], high: [usize; 2]) -> Change {
         let (mut sum, mut count) = (0.0, 0_u32);
+        let (mut broken_sum, mut broken) = (0.0, 0_u32);
         let mut middle = step;
         while middle + step <= self.cells[axis] {
             if middle + step > low[axis] && middle - step < high[axis] {
@@ -29,15 +45,30 @@ impl Grid<'_> {
                     if let (Some(a), Some(b), Some(c)) =
                         (node(middle - step), node(middle), node(middle + step))
                     {
-                        let surplus = b - 0.5 * (a + c);
-                        sum += surplus.length_squared() / 3.0;
+                        let surplus = (b - 0.5 * (a + c)).length_squared() / 3.0;
+                        sum += surplus;
                         count += 1;
+                        if self.is_broken(axis, [middle - step, middle + step], across) {
+                            broken_sum += surplus;
+                            broken += 1;
+                        }
                     }
                 }
             }
             middle += 2 * step;
         }
-        if count == 0 { 0.0 } else { HAT * sum / f64::from(count) }
+        let mean = |sum: f64, count: u32| if count == 0 { 0.0 } else { HAT * sum / f64::from(count) };
+        Change { whole: mean(sum, count), smooth: mean(sum - broken_sum, count - broken) }
+    }
+
+    /// Whether a known line runs between these two nodes of a row or column, or through one of them.
+    fn is_broken(&self, axis: usize, [first, last]: [usize; 2], across: usize) -> bool {
+        let reaches = |low: f64, high: f64, from: f64, to: f64| low - ON_LINE <= to && from <= high + ON_LINE;
+        self.lines.iter().any(|line| {
+            line.axis == axis
+                && reaches(first as f64, last as f64, line.at, line.at)
+                && reaches(across as f64, across as f64, line.from, line.to)
+        })
     }
 
     /// The most light that may be hidden or let through in the cells unseen; `None` where they hold nothing of the
@@ -68,18 +99,31 @@ mod tests {
     #[test]
     fn a_parabola_loses_a_sixteenth_of_its_energy_a_halving() {
         let light = grid(|x, _| x * x);
-        let grid = Grid { cells: [8, 8], light: &light };
-        let coarse = grid.energy(0, 2, [0, 0], [8, 8]);
+        let grid = Grid { cells: [8, 8], light: &light, lines: &[] };
+        let coarse = grid.energy(0, 2, [0, 0], [8, 8]).whole;
         assert!((coarse - HAT * (0.25_f64 * 0.25).powi(2)).abs() < 1e-12, "{coarse}");
-        assert!((grid.energy(0, 1, [0, 0], [8, 8]) - coarse / 16.0).abs() < 1e-12);
-        assert_eq!(grid.energy(1, 1, [0, 0], [8, 8]), 0.0);
+        assert!((grid.energy(0, 1, [0, 0], [8, 8]).whole - coarse / 16.0).abs() < 1e-12);
+        assert_eq!(grid.energy(1, 1, [0, 0], [8, 8]), Change::default());
     }
 
     #[test]
     fn an_edge_is_where_it_is() {
         let light = grid(|x, _| f64::from(x > 0.7));
-        let grid = Grid { cells: [8, 8], light: &light };
-        assert_eq!(grid.energy(0, 1, [0, 0], [4, 4]), 0.0);
-        assert!(grid.energy(0, 1, [4, 0], [8, 4]) > 0.0);
+        let grid = Grid { cells: [8, 8], light: &light, lines: &[] };
+        assert_eq!(grid.energy(0, 1, [0, 0], [4, 4]).whole, 0.0);
+        assert!(grid.energy(0, 1, [4, 0], [8, 4]).whole > 0.0);
+    }
+
+    /// Between a line and the grid's side light is even; where the line ends, it is not.
+    #[test]
+    fn what_breaks_at_a_known_line_is_not_beside_it() {
+        let light = grid(|x, y| f64::from(x > 0.7 && y < 0.51));
+        let line = |to| [KnownLine { axis: 0, at: 5.6, from: 0.0, to }];
+        let change =
+            |lines: &[KnownLine]| Grid { cells: [8, 8], light: &light, lines }.energy(0, 1, [0, 0], [8, 8]);
+        let (known, short, none) = (change(&line(4.0)), change(&line(3.0)), change(&[]));
+        assert!(known.whole > 0.0 && known.smooth == 0.0, "{known:?}");
+        assert!(short.smooth > 0.0 && short.smooth < short.whole, "{short:?}");
+        assert!(none.smooth == none.whole && none.whole == known.whole, "{none:?}");
     }
 }

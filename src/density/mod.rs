@@ -4,19 +4,24 @@
 //! breaks (`survey`). What each halving of the samples' spacing changes is the error that texels of that
 //! spacing leave. Then surfaces are cut into rectangular parts, each with a spacing along either axis,
 //! such that the sum of squared errors and a price for every texel is least; the price is raised until
-//! the texels fit the page (`cut`). This is rate–distortion optimal pruning of a tree of cuts
+//! the texels fit the page (`cut`); where something hangs closely over a surface, its outline is a place to cut
+//! at (`lines`). This is rate–distortion optimal pruning of a tree of cuts
 //! (P. A. Chou, T. Lookabaugh and R. M. Gray, "Optimal Pruning with Applications to Tree-Structured
 //! Source Coding and Modeling", 1989), with the bits being texels.
 
 mod cut;
 mod detail;
+mod lines;
 mod survey;
+
+use std::sync::Arc;
 
 use glam::DVec2;
 
 use crate::raster::Lighting;
 use crate::surface::Surface;
 use crate::unwrap::{Part, area_within};
+use lines::KnownLine;
 
 /// What is known before the light is looked at, or before surfaces are cut.
 #[derive(Clone, Copy, Debug)]
@@ -88,11 +93,15 @@ const LEVELS: usize = 14;
 type Energy = [[f32; LEVELS]; 2];
 
 /// A rectangle of a surface and the error in it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Cell {
     min: DVec2,
     max: DVec2,
     energy: Energy,
+    /// The same for parts that end at all of its `lines`.
+    smooth: Energy,
+    /// The known lines through the rectangle that was looked at first, which this is a part of.
+    lines: Arc<[KnownLine]>,
     /// Halvings that were looked at, for either axis; what `energy` tells of finer ones is a guess.
     levels: [usize; 2],
 }

@@ -11,6 +11,7 @@ use glam::{DAffine2, DMat2, DVec2, Vec3};
 use rayon::prelude::*;
 
 use super::detail::Grid;
+use super::lines::{KnownLine, known_lines};
 use super::{Cell, DensityOptions, Energy, LEVELS, SurfaceSurvey};
 use crate::geom::polygon::rectangle;
 use crate::raster::{CloserLook, Lighting, PointLight, Shadowing};
@@ -28,6 +29,9 @@ const BLIND_SPACING: f64 = 1.0;
 
 /// The mean squared error that light in doubt is taken to hide, as a fraction of its square.
 const DOUBT: f64 = 0.02;
+
+/// Outlines are known lines if they hang over a surface no higher than this many uniform texels.
+const LINE_REACH: f64 = 0.5;
 
 /// Samples for each texel, at most: the cheaper they are the more,
 const MOST_SAMPLES: f64 = 2.5;
@@ -71,6 +75,9 @@ struct Quarter {
     /// Halvings so far, for either axis.
     levels: [usize; 2],
     energy: Energy,
+    /// The same beside the known lines, and these.
+    smooth: Energy,
+    lines: Arc<[KnownLine]>,
     /// Mean squared error that shadows between the samples may hide.
     doubt: f64,
 }
@@ -86,9 +93,10 @@ struct Found {
 pub(super) fn survey(lighting: &Lighting, options: DensityOptions) -> Surveys {
     let surfaces = lighting.surfaces();
     let roots: Vec<Root> = surfaces.iter().map(|s| Root::of(s, options.uniform_texel)).collect();
+    let lines = known_lines(surfaces, lighting.tracer(), LINE_REACH * options.uniform_texel);
     let blind_spacing = BLIND_SPACING * options.uniform_texel;
     let tiles: Vec<Tile> =
-        roots.iter().enumerate().flat_map(|(index, root)| root.tiles(index, blind_spacing)).collect();
+        roots.iter().enumerate().flat_map(|(k, root)| root.tiles(k, blind_spacing, &lines[k])).collect();
     let mut samples = 0;
     let mut look = |tiles: &[Tile]| -> Vec<Quarter> {
         samples += tiles.iter().map(Tile::samples).sum::<u64>();
@@ -166,16 +174,17 @@ impl Root {
         (self.max - self.min) / DVec2::new(self.tiles[0] as f64, self.tiles[1] as f64)
     }
 
-    fn tiles(&self, surface: usize, blind_spacing: f64) -> Vec<Tile> {
+    fn tiles(&self, surface: usize, blind_spacing: f64, lines: &[KnownLine]) -> Vec<Tile> {
         let size = self.tile_size();
         if !size.is_finite() || size.min_element() <= 0.0 {
             return Vec::new();
         }
         let tile = |k: usize| {
             let at = DVec2::new((k % self.tiles[0]) as f64, (k / self.tiles[0]) as f64);
-            let min = self.min + at * size;
-            let levels = self.cells.map(|c| c.ilog2() as usize);
-            Tile { surface, min, max: min + size, cells: self.cells, levels, blind_spacing, coarser: None }
+            let (min, max) = (self.min + at * size, self.min + (at + 1.0) * size);
+            let (cells, levels) = (self.cells, self.cells.map(|c| c.ilog2() as usize));
+            let lines = lines.iter().filter(|line| line.crosses(min, max)).copied().collect();
+            Tile { surface, min, max, cells, levels, blind_spacing, lines, coarser: None }
         };
         (0..self.tiles[0] * self.tiles[1]).map(tile).collect()
     }
@@ -199,6 +208,8 @@ struct Tile {
     levels: [usize; 2],
     /// Shadows may hide between samples farther apart than this, metres.
     blind_spacing: f64,
+    /// The known lines through it, or through the larger one that it is a part of.
+    lines: Arc<[KnownLine]>,
     /// What it is looked at closer for, if there were coarser samples.
     coarser: Option<Coarser>,
 }
@@ -206,6 +217,7 @@ struct Tile {
 /// What coarser samples told of a tile.
 struct Coarser {
     energy: Energy,
+    smooth: Energy,
     /// The tile that it is a quarter of.
     found: Arc<Found>,
     /// Which quarter of that.
@@ -245,8 +257,17 @@ impl Tile {
             |light: &Option<PointLight>| light.and_then(|l| l.is_centre.then(|| l.irradiance.as_vec3()));
         let found = Found { light: look.light.iter().map(centre).collect(), shadowing: look.shadowing };
         let found = Arc::new(found);
-        let grid = Grid { cells: self.cells, light: &look.light };
+        let lines: Vec<KnownLine> = self.lines.iter().filter_map(|line| self.in_cells(line, scale)).collect();
+        let grid = Grid { cells: self.cells, light: &look.light, lines: &lines };
         (0..4).filter_map(|k| self.quarter(&grid, &found, [k % 2, k / 2])).collect()
+    }
+
+    /// A line that runs through it, in cells from the first node.
+    fn in_cells(&self, line: &KnownLine, scale: DVec2) -> Option<KnownLine> {
+        let cells = |axis: usize, p: f64| (p - self.min[axis]) * scale[axis];
+        let KnownLine { axis, at, from, to } = *line;
+        let (at, from, to) = (cells(axis, at), cells(1 - axis, from), cells(1 - axis, to));
+        line.crosses(self.min, self.max).then_some(KnownLine { axis, at, from, to })
     }
 
     /// The light at a node that the coarser samples had, too. Whether something hides between them is no longer
@@ -266,13 +287,15 @@ impl Tile {
         let low = [at[0] * half[0], at[1] * half[1]];
         let high = [low[0] + half[0], low[1] + half[1]];
         let doubtful = grid.doubtful(low, high)?;
-        let mut energy = self.coarser.as_ref().map(|c| c.energy).unwrap_or_default();
+        let (mut energy, mut smooth) =
+            self.coarser.as_ref().map(|c| (c.energy, c.smooth)).unwrap_or_default();
         for axis in 0..2 {
             // Coarser halvings are known from the tile that this one is a quarter of.
             let steps = if self.coarser.is_some() { 1 } else { self.levels[axis] };
             for step in 0..steps {
                 let change = grid.energy(axis, 1 << step, low, high);
-                energy[axis][self.levels[axis] - 1 - step] = change as f32;
+                energy[axis][self.levels[axis] - 1 - step] = change.whole as f32;
+                smooth[axis][self.levels[axis] - 1 - step] = change.smooth as f32;
             }
         }
         let middle = 0.5 * (self.min + self.max);
@@ -281,8 +304,9 @@ impl Tile {
         };
         let (min, max) = (pick(self.min, middle), pick(middle, self.max));
         let (surface, cells, levels) = (self.surface, self.cells, self.levels);
-        let found = Arc::clone(found);
-        let mut quarter = Quarter { surface, min, max, found, at, cells, levels, energy, doubt: 0.0 };
+        let (found, lines) = (Arc::clone(found), Arc::clone(&self.lines));
+        let mut quarter =
+            Quarter { surface, min, max, found, at, cells, levels, energy, smooth, lines, doubt: 0.0 };
         if quarter.spacing().max_element() > self.blind_spacing {
             quarter.doubt = DOUBT * doubtful * doubtful;
         }
@@ -302,9 +326,10 @@ impl Quarter {
 
     /// The tile that looks closer.
     fn tile(&self, blind_spacing: f64) -> Tile {
-        let Self { surface, min, max, at, cells, levels, energy, .. } = *self;
-        let coarser = Some(Coarser { energy, found: Arc::clone(&self.found), at });
-        Tile { surface, min, max, cells, levels: levels.map(|l| l + 1), blind_spacing, coarser }
+        let Self { surface, min, max, at, cells, levels, energy, smooth, .. } = *self;
+        let lines = Arc::clone(&self.lines);
+        let coarser = Some(Coarser { energy, smooth, found: Arc::clone(&self.found), at });
+        Tile { surface, min, max, cells, levels: levels.map(|l| l + 1), blind_spacing, lines, coarser }
     }
 
     /// What the last halving changed, and what may be hidden, for each sample that another one takes.
@@ -315,9 +340,16 @@ impl Quarter {
 
     /// What was found, and what follows from it about finer halvings.
     fn cell(&self) -> Cell {
-        let mut energy = self.energy;
+        let [energy, smooth] = [&self.energy, &self.smooth].map(|found| self.continued(found));
+        let lines = Arc::clone(&self.lines);
+        Cell { min: self.min, max: self.max, energy, smooth, lines, levels: self.levels }
+    }
+
+    /// What halvings changed, and will.
+    fn continued(&self, found: &Energy) -> Energy {
+        let mut energy = *found;
         let next = [0, 1].map(|axis| {
-            let (row, level) = (&self.energy[axis], self.levels[axis]);
+            let (row, level) = (&found[axis], self.levels[axis]);
             let last = f64::from(row[level - 1]);
             let before = level.checked_sub(2).map_or(0.0, |l| f64::from(row[l]));
             let ratio = if before > 0.0 { (last / before).clamp(FASTEST, SLOWEST) } else { 0.5 * SLOWEST };
@@ -332,7 +364,7 @@ impl Quarter {
                 value *= ratio;
             }
         }
-        Cell { min: self.min, max: self.max, energy, levels: self.levels }
+        energy
     }
 }
 
@@ -357,6 +389,7 @@ mod tests {
             cells: [8, 4],
             levels,
             blind_spacing: 1.0,
+            lines: Arc::new([]),
             coarser: None,
         };
         let whole = tile(DVec2::new(2.0, 1.0), DVec2::new(18.0, 9.0), [3, 2]);
@@ -365,7 +398,12 @@ mod tests {
         for at in [[0, 0], [1, 0], [0, 1], [1, 1]] {
             let min = whole.min + half * DVec2::new(at[0] as f64, at[1] as f64);
             let quarter = tile(min, min + half, [4, 3]);
-            let coarser = Coarser { energy: Energy::default(), found: Arc::clone(&found), at };
+            let coarser = Coarser {
+                energy: Energy::default(),
+                smooth: Energy::default(),
+                found: Arc::clone(&found),
+                at,
+            };
             let expected = samples_of(&quarter);
             let mut count = 0;
             for (k, expected) in expected.iter().enumerate() {

@@ -9,7 +9,8 @@ use std::collections::HashMap;
 use glam::DVec2;
 
 use super::direct::LitTexel;
-use crate::geom::polygon::contains;
+use crate::geom::Ring;
+use crate::geom::polygon::{contains, is_in_convex};
 use crate::surface::Surface;
 use crate::trace::Tracer;
 
@@ -18,6 +19,9 @@ const GAP: f64 = 0.25;
 
 /// A texel is searched for a place that is seen in a square of this many a side.
 const PLACES_A_SIDE: u32 = 5;
+
+/// Covered texels at a chart's border show what is this many texels inside of it.
+const DEPTH: f64 = 0.5;
 
 /// What is seen of a texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +41,8 @@ pub(super) struct Cover<'a> {
     pub tracer: &'a Tracer,
     /// The surface.
     pub surface: &'a Surface,
+    /// What of the surface the chart shows.
+    pub outline: &'a Ring,
     /// From one texel to the next, right and down, plane coordinates.
     pub step: [DVec2; 2],
 }
@@ -60,9 +66,20 @@ impl Cover<'_> {
                     texel.covering = Covering::Beside;
                 } else {
                     texel.covering = Covering::Under;
+                    texel.point = self.farther_inside(texel.point);
                 }
             }
         }
+    }
+
+    /// A place within the chart that is farther from its border, where that ends at the cover's outline: within a gap's
+    /// height of it there is light that dies away farther inside.
+    fn farther_inside(&self, point: DVec2) -> DVec2 {
+        let reach = DEPTH * (self.step[0].abs() + self.step[1].abs());
+        let ends = |pick: fn(DVec2, DVec2) -> DVec2| self.outline.iter().copied().reduce(pick);
+        let (Some(low), Some(high)) = (ends(DVec2::min), ends(DVec2::max)) else { return point };
+        let reach = reach.min(0.5 * (high - low));
+        point.clamp(low + reach, high - reach)
     }
 
     /// The place that is seen, of the texel's region, and nearest to its point, in a square of `side` texels.
@@ -75,7 +92,7 @@ impl Cover<'_> {
         };
         (0..PLACES_A_SIDE * PLACES_A_SIDE)
             .map(place)
-            .filter(|&p| contains(rings, p) && !self.hides(p))
+            .filter(|&p| contains(rings, p) && is_in_convex(self.outline, p) && !self.hides(p))
             .min_by(|a, b| a.distance_squared(texel.point).total_cmp(&b.distance_squared(texel.point)))
     }
 }

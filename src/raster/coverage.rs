@@ -21,6 +21,9 @@ use crate::unwrap::{Atlas, Chart};
 /// what a texel can show, large against rounding.
 const MARGIN: f64 = 1.0 / 64.0;
 
+/// The same at a cut, where something may hang over one side of it.
+const CUT_MARGIN: f64 = 1.0 / 256.0;
+
 /// How far from a texel's centre an open region is looked for, texels in each direction.
 const OPEN_REACH: f64 = 1.5;
 
@@ -110,8 +113,8 @@ struct TexelTriangle {
     region: u32,
     /// Counter-clockwise by [`orient`].
     corners: [DVec2; 3],
-    /// Whether the edge from corner `i` to the next is part of the region's boundary.
-    outer: [bool; 3],
+    /// How far points keep from the edge from corner `i` to the next, texels.
+    margins: [f64; 3],
 }
 
 /// The texels from `min` up to and without `max`.
@@ -136,13 +139,13 @@ fn prepare(surface: &Surface, chart: &Chart, size: (u32, u32)) -> TexelChart {
     for (region, r) in surface.regions.iter().enumerate() {
         let outer = boundary_edges(&r.triangles);
         let parts = r.triangles.iter().zip(outer).flat_map(|(&t, outer)| part_of(t, outer, &chart.outline));
-        triangles.extend(parts.map(|(t, outer)| {
+        triangles.extend(parts.map(|(t, margins)| {
             let [a, b, c] = t.map(|p| chart.texel(p));
             if orient(a, b, c) >= 0.0 {
-                TexelTriangle { region: region as u32, corners: [a, b, c], outer }
+                TexelTriangle { region: region as u32, corners: [a, b, c], margins }
             } else {
-                let outer = [outer[2], outer[1], outer[0]];
-                TexelTriangle { region: region as u32, corners: [a, c, b], outer }
+                let margins = [margins[2], margins[1], margins[0]];
+                TexelTriangle { region: region as u32, corners: [a, c, b], margins }
             }
         }));
     }
@@ -158,22 +161,29 @@ fn prepare(surface: &Surface, chart: &Chart, size: (u32, u32)) -> TexelChart {
     TexelChart { triangles, window, plane_from_texel: chart.texel_from_plane.inverse() }
 }
 
-/// What of a triangle with these outer edges lies in a chart's outline, as triangles with theirs. A cut is none.
-fn part_of(triangle: [DVec2; 3], outer: [bool; 3], outline: &Ring) -> Vec<([DVec2; 3], [bool; 3])> {
+/// What of a triangle with these outer edges lies in a chart's outline, as triangles with their edges' margins.
+fn part_of(triangle: [DVec2; 3], outer: [bool; 3], outline: &Ring) -> Vec<([DVec2; 3], [f64; 3])> {
     let ring = clip_triangle(triangle, outline);
+    let own = outer.map(|outer| if outer { MARGIN } else { 0.0 });
     if ring == triangle {
-        return vec![(triangle, outer)];
+        return vec![(triangle, own)];
     }
-    let is_outer = |a: DVec2, b: DVec2| {
+    let last = ring.len() - 1;
+    let fan = (2..ring.len()).map(|k| ([0, k - 1, k], [k == 2, true, k == last]));
+    let margin = |a: DVec2, b: DVec2| {
         let middle = 0.5 * (a + b);
-        let near = |i: usize| {
+        let near = |&i: &usize| {
             let (from, to) = (triangle[i], triangle[(i + 1) % 3]);
             nearest_on_segment(from, to, middle).distance(middle) < 1e-9 * from.distance(to)
         };
-        (0..3).any(|i| outer[i] && near(i))
+        (0..3).find(near).map_or(CUT_MARGIN, |i| own[i])
     };
-    let fan = (2..ring.len()).map(|k| [ring[0], ring[k - 1], ring[k]]);
-    fan.map(|t| (t, [0, 1, 2].map(|i| is_outer(t[i], t[(i + 1) % 3])))).collect()
+    fan.map(|(corners, is_edge)| {
+        let t = corners.map(|k| ring[k]);
+        let edge = |i: usize| if is_edge[i] { margin(t[i], t[(i + 1) % 3]) } else { 0.0 };
+        (t, [0, 1, 2].map(edge))
+    })
+    .collect()
 }
 
 /// Which edges belong to one triangle only; a T-junction's edges count as such, which is harmless.
@@ -308,25 +318,25 @@ fn nearest(&[a, b, c]: &[DVec2; 3], p: DVec2) -> DVec2 {
         .fold(on_edges[0], |best, q| if q.distance_squared(p) < best.distance_squared(p) { q } else { best })
 }
 
-/// Moves a point of the triangle off the region's boundary, by about [`MARGIN`].
+/// Moves a point of the triangle off the region's boundary and off cuts, by about their margins.
 fn inside(triangle: &TexelTriangle, p: DVec2) -> DVec2 {
     let corners = triangle.corners;
     let edges = [0, 1, 2].map(|i| (corners[i], corners[(i + 1) % 3]));
     let near = |q: DVec2| {
         // Corners are on the boundary even where neither edge of this triangle is.
-        edges.iter().zip(triangle.outer).any(|(&(a, b), outer)| {
-            (outer && nearest_on_segment(a, b, q).distance(q) < 0.5 * MARGIN) || a.distance(q) < 0.5 * MARGIN
+        edges.iter().zip(triangle.margins).any(|(&(a, b), margin)| {
+            nearest_on_segment(a, b, q).distance(q) < 0.5 * margin || a.distance(q) < 0.5 * MARGIN
         })
     };
     if !near(p) {
         return p;
     }
     let mut pushed = p;
-    for (&(a, b), outer) in edges.iter().zip(triangle.outer) {
+    for (&(a, b), margin) in edges.iter().zip(triangle.margins) {
         let along = (b - a).normalize_or_zero();
         let depth = along.perp_dot(pushed - a);
-        if outer && depth < MARGIN {
-            pushed += (MARGIN - depth) * along.perp();
+        if depth < margin {
+            pushed += (margin - depth) * along.perp();
         }
     }
     let is_in = edges.iter().all(|&(a, b)| orient(a, b, pushed) > 0.0);

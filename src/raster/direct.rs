@@ -175,8 +175,8 @@ impl DirectLight<'_> {
     /// Each emitter shining on a surface's chart.
     fn shinings<'a>(&'a self, surface: &'a Surface, chart: &'a Chart) -> impl Iterator<Item = Shining<'a>> {
         let plane_from_texel = chart.texel_from_plane.inverse();
-        let cover = Cover { tracer: self.tracer, surface, step: texel_steps(chart) };
         let outline = &chart.outline;
+        let cover = Cover { tracer: self.tracer, surface, outline, step: texel_steps(chart) };
         let of = move |emitter| Shining { light: self, surface, outline, plane_from_texel, cover, emitter };
         self.emitters.iter().map(of)
     }

@@ -157,6 +157,12 @@ impl<'a> Lighting<'a> {
         self.input.surfaces
     }
 
+    /// The scene's triangles.
+    #[must_use]
+    pub fn tracer(&self) -> &'a Tracer {
+        self.input.tracer
+    }
+
     /// How many emitters light the surfaces.
     #[must_use]
     pub fn emitters(&self) -> usize {
@@ -329,7 +335,8 @@ fn chart_texels(
     let mut texels: Vec<LitTexel> =
         indices.iter().map(|&index| LitTexel::new(index, &sites[index])).collect();
     let step = texel_steps(chart);
-    let cover = Cover { tracer: input.tracer, surface: &input.surfaces[surface], step };
+    let cover =
+        Cover { tracer: input.tracer, surface: &input.surfaces[surface], outline: &chart.outline, step };
     cover.uncover(&mut texels);
     let (mut ways, mut effort) = (TexelWays::default(), Effort::default());
     if input.options.direct == Direct::Texel {
