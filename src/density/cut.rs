@@ -45,15 +45,17 @@ const TRIES: u32 = 30;
 /// All surfaces' parts, together of as many texels as the options allow.
 pub(super) fn cut(surfaces: &[Surface], surveys: &Surveys, options: DensityOptions) -> Vec<Part> {
     let most = surveys.surfaces.iter().map(total_error).sum::<f64>().max(f64::MIN_POSITIVE);
-    let mut price = surveys.price.clamp(1e-16 * most, most);
+    let mut price = SPARE * surveys.price.clamp(1e-16 * most, most);
     let mut leaves;
     loop {
         // At a lower price than will be paid there are more cuts than needed.
-        let forest = Forest::new(surveys, options, SPARE * price);
+        let forest = Forest::new(surveys, options, price);
         (price, leaves) = forest.within(options.texels, (1e-16 * most, most));
         if price >= forest.price || price <= 1e-15 * most {
             break;
         }
+        // With more cuts texels go farther, and the price will be higher than that.
+        price *= 0.5;
     }
     let parts = leaves.into_iter().zip(surfaces).enumerate();
     parts.flat_map(|(index, (leaves, surface))| parts_of(index, surface, &leaves)).collect()

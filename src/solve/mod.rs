@@ -44,10 +44,10 @@ use patches::{Energy, Patches, Receiver};
 use umbra::Occluders;
 
 /// Light in narrow gaps is followed for so many reflections at most,
-const MOST_SWEEPS: u32 = 24;
+const MOST_SWEEPS: u32 = 16;
 
 /// or until none changes it by more than this fraction,
-const UNSETTLED: f64 = 0.0025;
+const UNSETTLED: f64 = 0.005;
 
 /// and at first everywhere.
 const ANY: f64 = -1.0;
