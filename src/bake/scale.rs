@@ -13,7 +13,7 @@ const PATCHES: f64 = 500.0;
 const UTILISATION: f64 = 0.6;
 
 /// With direct light evaluated in texels, elements need not follow its shadows closer than this many texels.
-const TEXELS_AN_ELEMENT: f64 = 4.0;
+const TEXELS_AN_ELEMENT: f64 = 3.0;
 
 /// Reflected light is followed into corners that a uniform atlas would not show: texels are finer where light is.
 const ELEMENTS_A_TEXEL: f64 = 2.0;

@@ -46,6 +46,14 @@ pub struct RadiosityField<'a> {
     excess: HashMap<u32, FieldPatch>,
 }
 
+/// A place that a ray met. It is the same in every field of elements that were not split since.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    patch: u32,
+    /// Metres from the surface's least corner.
+    at: Vec2,
+}
+
 /// One side of a surface.
 struct SideField {
     /// `y` runs the other way on the back, as in facets.
@@ -219,37 +227,43 @@ impl<'a> RadiosityField<'a> {
     /// The radiosity that a ray met at `point`; zero on the back of a single-sided surface.
     #[must_use]
     pub fn radiosity(&self, tracer: &Tracer, hit: &Hit, point: DVec3) -> Vec3 {
-        self.patch_met(tracer, hit, point).map_or(Vec3::ZERO, |(_, patch, p)| patch.at(p))
+        self.patch_met(tracer, hit, point).map_or(Vec3::ZERO, |(_, met)| self.radiosity_met(&met))
     }
 
-    /// The radiosity that a ray met, seen from a place with this normal: zero where it did not leave
+    /// What a ray met that shines onto a place with this normal; nothing where it did not leave
     /// [the gap](super::overhang) between the two.
     #[inline]
     #[must_use]
-    pub fn radiosity_seen(&self, tracer: &Tracer, (hit, point): (&Hit, DVec3), normal: DVec3) -> Vec3 {
-        let Some((side, patch, p)) = self.patch_met(tracer, hit, point) else { return Vec3::ZERO };
-        if hit.distance < f64::from(patch.gap) && side.frame.normal.dot(normal) < FACING {
-            return Vec3::ZERO;
-        }
-        patch.at(p)
+    pub fn met(&self, tracer: &Tracer, (hit, point): (&Hit, DVec3), normal: DVec3) -> Option<Met> {
+        let (side, met) = self.patch_met(tracer, hit, point)?;
+        let is_in_gap = hit.distance < f64::from(self.patches[met.patch as usize].gap)
+            && side.frame.normal.dot(normal) < FACING;
+        (!is_in_gap).then_some(met)
     }
 
-    /// The patch that a ray met, on which side of its surface, and where on that.
+    /// The radiosity of what a ray met.
     #[inline]
-    fn patch_met(&self, tracer: &Tracer, hit: &Hit, point: DVec3) -> Option<(&SideField, &FieldPatch, Vec2)> {
+    #[must_use]
+    pub fn radiosity_met(&self, met: &Met) -> Vec3 {
+        self.patches[met.patch as usize].at(met.at)
+    }
+
+    /// The patch that a ray met, and on which side of its surface.
+    #[inline]
+    fn patch_met(&self, tracer: &Tracer, hit: &Hit, point: DVec3) -> Option<(&SideField, Met)> {
         let surface = self.locator.surface_of(hit.triangle) as usize;
         let side = self.sides.get(2 * surface + usize::from(hit.from_behind))?;
         if side.cells.x == 0 {
             return None;
         }
-        let p = (side.frame.project(point) - side.min).as_vec2();
-        let cell = (p * side.cells_per_metre).max(Vec2::ZERO).as_uvec2().min(side.cells - 1);
-        let mut at = self.starts[(side.first + cell.y * side.cells.x + cell.x) as usize];
-        if at == SHARED {
+        let at = (side.frame.project(point) - side.min).as_vec2();
+        let cell = (at * side.cells_per_metre).max(Vec2::ZERO).as_uvec2().min(side.cells - 1);
+        let mut start = self.starts[(side.first + cell.y * side.cells.x + cell.x) as usize];
+        if start == SHARED {
             let (facet, _) = self.locator.find(tracer, hit, point)?;
-            at = self.roots[facet];
+            start = self.roots[facet];
         }
-        Some((side, &self.patches[self.patch_from(at, p) as usize], p))
+        Some((side, Met { patch: self.patch_from(start, at), at }))
     }
 }
 

@@ -19,12 +19,13 @@ use super::budget::{Contrasts, Leniency, Round, level_for};
 use super::contact::{Covered, Nearby};
 use super::direct::DirectPass;
 use super::emitter::{Evaluation, Precision, irradiance_by_rays};
-use super::field::RadiosityField;
+use super::field::{Met, RadiosityField};
 use super::form_factor::SurfacePoint;
 use super::hemisphere::{Directions, Level};
 use super::hot::HotSpot;
 use super::overhang::{CLOSE, Overhang};
 use super::patches::Receiver;
+use super::sight::{Place, Sight, Sights};
 use crate::element::{Facet, Shading};
 use crate::geom::Frame;
 use crate::light::luminance;
@@ -127,7 +128,8 @@ pub struct Source<'a> {
 }
 
 /// Gathers what `source` reflects, in place of the reflected light that there was. `receivers` holds the elements
-/// to begin with, by facet; the others keep what they have.
+/// to begin with, by facet; the others keep what they have. Places that are among the `sights`, by facet, too, do
+/// not look again; the others are added to them.
 ///
 /// Returns, by facet, the elements in narrow gaps, too, whose light has not settled: that changed by more than a
 /// fraction `unsettled` of it, now or in the round before.
@@ -136,12 +138,18 @@ pub fn gather(
     source: Source,
     receivers: &[Vec<Receiver>],
     (round, unsettled): (Round, f64),
+    sights: Option<&mut [Sights]>,
     facets: &mut [Facet],
 ) -> (GatherCounts, Vec<Vec<Receiver>>) {
+    let sights: Vec<Option<&mut Sights>> = match sights {
+        Some(sights) => sights.iter_mut().map(Some).collect(),
+        None => facets.iter().map(|_| None).collect(),
+    };
     let counts: Vec<(GatherCounts, Vec<Receiver>)> = facets
         .par_iter_mut()
         .zip(receivers)
-        .map(|(facet, receivers)| {
+        .zip(sights)
+        .map(|((facet, receivers), sights)| {
             if receivers.is_empty() {
                 return (GatherCounts::default(), Vec::new());
             }
@@ -154,7 +162,9 @@ pub fn gather(
                 receiver: Receiver { element: 0, contrast: 0.0, reach: 0.0, idle: 0 },
                 unsettled,
                 enclosed: Vec::new(),
+                sights,
                 stack: FanStack::default(),
+                met: Vec::new(),
                 nearby: Nearby::default(),
                 evaluation: Evaluation::new(Precision::HOT_SPOT),
                 places: vec![None; facet.samples.len()],
@@ -188,7 +198,11 @@ struct Gathering<'a> {
     /// Elements in narrow gaps whose light changed by more than this fraction of it.
     unsettled: f64,
     enclosed: Vec<Receiver>,
+    /// What places saw that are asked again, if it is kept.
+    sights: Option<&'a mut Sights>,
     stack: FanStack,
+    /// Memory for what a place meets.
+    met: Vec<(Met, f32)>,
     nearby: Nearby,
     /// For hot spots.
     evaluation: Evaluation,
@@ -221,7 +235,7 @@ impl Gathering<'_> {
             }
             let e = &self.facet.elements[element as usize];
             let place = e.overhang.map_or(e.centroid, |overhang| overhang.open);
-            let gathered = self.at(self.facet.receiving(place));
+            let gathered = self.again(Place::Element(element), self.facet.receiving(place));
             let shading = Shading { corners: [gathered.irradiance; 4], bulge: DVec3::ZERO };
             self.keep(element, shading, gathered.is_enclosed);
             return;
@@ -414,12 +428,39 @@ impl Gathering<'_> {
         if let Some(known) = self.places[sample as usize] {
             return known;
         }
-        let gathered = self.at(self.facet.samples[sample as usize].point);
+        let gathered = self.again(Place::Sample(sample), self.facet.samples[sample as usize].point);
         self.places[sample as usize] = Some(gathered);
         gathered
     }
 
+    /// What a place gathers that may have been asked before.
+    fn again(&mut self, place: Place, point: SurfacePoint) -> Gathered {
+        let Some(sights) = &self.sights else { return self.at(point) };
+        if let Some(sight) = sights.get(&place) {
+            self.counts.places += 1;
+            return self.gathered(sight);
+        }
+        let sight = self.look(point);
+        let gathered = self.gathered(&sight);
+        if let Some(sights) = &mut self.sights {
+            sights.insert(place, sight);
+        }
+        gathered
+    }
+
     fn at(&mut self, point: SurfacePoint) -> Gathered {
+        let sight = self.look(point);
+        let gathered = self.gathered(&sight);
+        self.met = sight.met;
+        gathered
+    }
+
+    fn gathered(&self, sight: &Sight) -> Gathered {
+        let Sight { distance, is_enclosed, .. } = *sight;
+        Gathered { irradiance: sight.irradiance(self.source.field), distance, is_enclosed }
+    }
+
+    fn look(&mut self, point: SurfacePoint) -> Sight {
         let tracer = self.pass.tracer;
         let fans = self.source.directions.fans(self.level);
         let smooth = self.facet.smooth.as_deref();
@@ -427,11 +468,13 @@ impl Gathering<'_> {
             None => self.facet.frame,
             Some(_) => Frame::new(point.position, point.normal, self.facet.frame.u),
         };
-        let (mut sum, mut nearness, mut near) = (DVec3::ZERO, 0.0, 0_u32);
+        let (mut nearness, mut near) = (0.0, 0_u32);
         let (reach, surface) = (self.receiver.reach, self.facet.surface);
         let Source { field, hot_spots, .. } = self.source;
+        let mut met = std::mem::take(&mut self.met);
+        met.clear();
         tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at, share| {
-            sum += share * field.radiosity_seen(tracer, (hit, at), normal).as_dvec3();
+            met.extend(field.met(tracer, (hit, at), normal).map(|met| (met, share as f32)));
             if smooth.is_some() && field.is_of(hit, surface) {
                 return; // a facet of a hollow: so near that it would tell nothing of what else is about
             }
@@ -445,10 +488,7 @@ impl Gathering<'_> {
         let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
         let spots = hot_spots.iter().map(|s| (&s.emitter, || s.exitance_at(point.position, field)));
         let hot = irradiance_by_rays(spots, point, tracer, negligible, &mut self.evaluation);
-        Gathered {
-            irradiance: sum / rays + hot,
-            distance: rays / nearness,
-            is_enclosed: f64::from(near) > ENCLOSED * rays,
-        }
+        let is_enclosed = f64::from(near) > ENCLOSED * rays;
+        Sight { met, rays, hot, distance: rays / nearness, is_enclosed }
     }
 }

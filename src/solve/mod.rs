@@ -21,6 +21,7 @@ pub mod locate;
 pub mod overhang;
 pub mod patches;
 pub mod sequence;
+pub mod sight;
 pub mod umbra;
 pub mod visible;
 
@@ -41,6 +42,7 @@ use hemisphere::Directions;
 use hot::HotSpots;
 use locate::FacetLocator;
 use patches::{Energy, Patches, Receiver};
+use sight::{Sights, sights};
 use umbra::Occluders;
 
 /// Light in narrow gaps is followed for so many reflections at most,
@@ -193,25 +195,30 @@ fn gather_reflected(
     let mut counts = GatherCounts::default();
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
     let texels = area / texel.powi(2);
-    let gather_from = |receivers: &[Vec<Receiver>], round: (Round, f64), facets: &mut [Facet]| {
+    let gather_from = |receivers: &[Vec<Receiver>],
+                       round: (Round, f64),
+                       seen: Option<&mut [Sights]>,
+                       facets: &mut [Facet]| {
         let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
         let hot_spots = hot.shining(&field, facets);
         let source = Source { field: &field, hot_spots: &hot_spots, directions: &directions };
-        let (own, unsettled) = gather(pass, source, receivers, round, facets);
+        let (own, unsettled) = gather(pass, source, receivers, round, seen, facets);
         tracing::debug!(?round, places = own.places, rays = own.rays, "gathered");
         (own, unsettled)
     };
     let mut gaps_are_dark = false;
     let mut approach = |round: Round, done: f64, facets: &mut [Facet]| {
         let before = shadings(facets);
-        let (own, mut gaps) = gather_from(&receivers, (round, ANY), facets);
+        let (own, mut gaps) = gather_from(&receivers, (round, ANY), None, facets);
         counts.add(&own);
         if !std::mem::replace(&mut gaps_are_dark, true) {
             // What patches say of narrow gaps may be off by any amount. Light comes in from outside.
             darken(&gaps, facets);
         }
+        let mut seen = sights(&gaps);
         for _ in 0..MOST_SWEEPS {
-            let (own, left) = gather_from(&gaps, (Round::in_gaps(round), UNSETTLED), facets);
+            let round = (Round::in_gaps(round), UNSETTLED);
+            let (own, left) = gather_from(&gaps, round, seen.as_deref_mut(), facets);
             counts.add(&own);
             gaps = left;
             if gaps.iter().all(Vec::is_empty) {
@@ -237,7 +244,7 @@ fn gather_reflected(
         }
     };
     tracing::debug!(error, "affordable");
-    counts.add(&gather_from(&receivers, (Round::last(error), ANY), facets).0);
+    counts.add(&gather_from(&receivers, (Round::last(error), ANY), None, facets).0);
     if !progress(1.0) {
         return None;
     }
