@@ -15,6 +15,9 @@ const UTILISATION: f64 = 0.6;
 /// With direct light evaluated in texels, elements need not follow its shadows closer than this many texels.
 const TEXELS_AN_ELEMENT: f64 = 3.0;
 
+/// Patches have no shorter sides than this many texels.
+const TEXELS_A_PATCH: f64 = 4.0;
+
 /// Reflected light is followed into corners that a uniform atlas would not show: texels are finer where light is.
 const ELEMENTS_A_TEXEL: f64 = 2.0;
 
@@ -49,6 +52,11 @@ impl Scale {
             Direct::Texel => TEXELS_AN_ELEMENT * texel,
         });
         let indirect_threshold = options.subdivision_threshold.unwrap_or(texel / ELEMENTS_A_TEXEL);
-        Self { patch_size: patch_size.max(threshold), threshold, indirect_threshold, texel }
+        Self {
+            patch_size: patch_size.max(threshold).max(TEXELS_A_PATCH * texel),
+            threshold,
+            indirect_threshold,
+            texel,
+        }
     }
 }

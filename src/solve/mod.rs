@@ -46,10 +46,10 @@ use sight::{Sights, sights};
 use umbra::Occluders;
 
 /// Light in narrow gaps is followed for so many reflections at most,
-const MOST_SWEEPS: u32 = 16;
+const MOST_SWEEPS: u32 = 24;
 
 /// or until none changes it by more than this fraction,
-const UNSETTLED: f64 = 0.005;
+const UNSETTLED: f64 = 0.0025;
 
 /// and at first everywhere.
 const ANY: f64 = -1.0;
