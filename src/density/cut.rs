@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::lines::KnownLine;
 use super::survey::Surveys;
 use super::{Cell, DensityOptions, LEVELS, SurfaceSurvey};
-use crate::geom::polygon::{clip_triangle, orient, rectangle};
+use crate::geom::polygon::{clip_triangle, rectangle, signed_area};
 use crate::surface::Surface;
 use crate::unwrap::Part;
 
@@ -118,25 +118,23 @@ fn total_error(survey: &SurfaceSurvey) -> f64 {
     survey.cells.iter().map(of).sum()
 }
 
-/// The leaves that hold something of the surface, as parts; the whole where there are none.
+/// The leaves that hold something of the surface, as parts.
+///
+/// What nobody sees was not surveyed. A leaf of which that is the most takes no more texels for it than were counted.
 fn parts_of(index: usize, surface: &Surface, leaves: &[Leaf]) -> Vec<Part> {
-    let part = |leaf: &Leaf| Part {
-        surface: index,
-        outline: rectangle(leaf.min, leaf.max).to_vec(),
-        weight: 1.0 / leaf.spacing,
+    let is_whole = leaves.len() == 1;
+    let part = |leaf: &Leaf| {
+        let outline = rectangle(leaf.min, leaf.max).to_vec();
+        let (mut area, mut low, mut high) = (0.0, DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for &triangle in surface.regions.iter().flat_map(|r| &r.triangles) {
+            let ring = clip_triangle(triangle, &outline);
+            area += signed_area(&ring).abs();
+            (low, high) = ring.iter().fold((low, high), |(low, high), &p| (low.min(p), high.max(p)));
+        }
+        let weight = leaf.count / (high - low).max(leaf.spacing * leaf.count);
+        (is_whole || area > 0.0).then_some(Part { surface: index, outline, weight })
     };
-    let area = |part: &Part| -> f64 {
-        let triangles = surface.regions.iter().flat_map(|r| &r.triangles);
-        let inside = triangles.map(|&t| clip_triangle(t, &part.outline));
-        inside
-            .map(|ring| (2..ring.len()).map(|k| orient(ring[0], ring[k - 1], ring[k]).abs()).sum::<f64>())
-            .sum()
-    };
-    if leaves.len() == 1 {
-        return vec![part(&leaves[0])];
-    }
-    let parts: Vec<Part> = leaves.iter().map(part).filter(|p| area(p) > 0.0).collect();
-    parts
+    leaves.iter().filter_map(part).collect()
 }
 
 /// A part of a surface that is not cut further.
@@ -145,6 +143,8 @@ struct Leaf {
     min: DVec2,
     max: DVec2,
     spacing: DVec2,
+    /// Texels along either axis.
+    count: DVec2,
     /// That its chart takes, with the gap beside it.
     texels: f64,
     /// Error and price.
@@ -299,7 +299,7 @@ impl<'a> Cutter<'a> {
     /// A rectangle as one part, at its best spacing.
     fn leaf(&self, (min, max): (DVec2, DVec2), sum: &Sum) -> Leaf {
         const LAST: usize = STEPS * LEVELS - 1;
-        let none = Leaf { min, max, spacing: max - min, texels: 0.0, cost: 0.0 };
+        let none = Leaf { min, max, spacing: max - min, count: DVec2::ONE, texels: 0.0, cost: 0.0 };
         let extent = sum.max - sum.min;
         if !extent.is_finite() || extent.min_element() <= 0.0 {
             return none;
@@ -344,8 +344,8 @@ impl<'a> Cutter<'a> {
             best = (first[1]..=last[1]).fold(best, |best, y| least(best, [x, y]));
         }
         let (cost, step) = best;
-        let count = [texels[0][step[0]], texels[1][step[1]]];
-        Leaf { min, max, spacing: extent / DVec2::from(count), texels: self.chart_texels(count), cost }
+        let count = DVec2::new(texels[0][step[0]], texels[1][step[1]]);
+        Leaf { min, max, spacing: extent / count, count, texels: self.chart_texels(count.to_array()), cost }
     }
 
     /// Texels that a chart takes with the gap beside it.

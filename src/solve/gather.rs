@@ -437,27 +437,37 @@ impl Gathering<'_> {
     fn again(&mut self, place: Place, point: SurfacePoint) -> Gathered {
         let Some(sights) = &self.sights else { return self.at(point) };
         if let Some(sight) = sights.get(&place) {
+            let seen = self.seen(sight);
             self.counts.places += 1;
-            return self.gathered(sight);
+            return self.with_hot_spots(point, seen);
         }
         let sight = self.look(point);
-        let gathered = self.gathered(&sight);
+        let seen = self.seen(&sight);
         if let Some(sights) = &mut self.sights {
             sights.insert(place, sight);
         }
-        gathered
+        self.with_hot_spots(point, seen)
     }
 
     fn at(&mut self, point: SurfacePoint) -> Gathered {
         let sight = self.look(point);
-        let gathered = self.gathered(&sight);
+        let seen = self.seen(&sight);
         self.met = sight.met;
-        gathered
+        self.with_hot_spots(point, seen)
     }
 
-    fn gathered(&self, sight: &Sight) -> Gathered {
+    fn seen(&self, sight: &Sight) -> Gathered {
         let Sight { distance, is_enclosed, .. } = *sight;
         Gathered { irradiance: sight.irradiance(self.source.field), distance, is_enclosed }
+    }
+
+    /// Hot spots may lie in gaps, too, and shine as the field says.
+    fn with_hot_spots(&mut self, point: SurfacePoint, seen: Gathered) -> Gathered {
+        let Source { field, hot_spots, .. } = self.source;
+        let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
+        let spots = hot_spots.iter().map(|s| (&s.emitter, || s.exitance_at(point.position, field)));
+        let hot = irradiance_by_rays(spots, point, self.pass.tracer, negligible, &mut self.evaluation);
+        Gathered { irradiance: seen.irradiance + hot, ..seen }
     }
 
     fn look(&mut self, point: SurfacePoint) -> Sight {
@@ -470,7 +480,7 @@ impl Gathering<'_> {
         };
         let (mut nearness, mut near) = (0.0, 0_u32);
         let (reach, surface) = (self.receiver.reach, self.facet.surface);
-        let Source { field, hot_spots, .. } = self.source;
+        let field = self.source.field;
         let mut met = std::mem::take(&mut self.met);
         met.clear();
         tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at, share| {
@@ -485,10 +495,7 @@ impl Gathering<'_> {
         self.counts.places += 1;
         self.counts.contrasts.add(self.contrast, 1);
         self.counts.rays += self.level.rays() as u64;
-        let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
-        let spots = hot_spots.iter().map(|s| (&s.emitter, || s.exitance_at(point.position, field)));
-        let hot = irradiance_by_rays(spots, point, tracer, negligible, &mut self.evaluation);
         let is_enclosed = f64::from(near) > ENCLOSED * rays;
-        Sight { met, rays, hot, distance: rays / nearness, is_enclosed }
+        Sight { met, rays, distance: rays / nearness, is_enclosed }
     }
 }

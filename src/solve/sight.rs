@@ -33,8 +33,6 @@ pub struct Sight {
     pub met: Vec<(Met, f32)>,
     /// Its rays.
     pub rays: f64,
-    /// Irradiance from hot spots: these do not lie in gaps, and stay as they are.
-    pub hot: DVec3,
     /// Harmonic mean distance of what the rays met, metres.
     pub distance: f64,
     /// Whether most of the rays met something near.
@@ -42,11 +40,11 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// The irradiance there.
+    /// The irradiance there, without that from hot spots.
     #[must_use]
     pub fn irradiance(&self, field: &RadiosityField) -> DVec3 {
         let of = |(met, share): &(Met, f32)| f64::from(*share) * field.radiosity_met(met).as_dvec3();
-        self.met.iter().map(of).sum::<DVec3>() / self.rays + self.hot
+        self.met.iter().map(of).sum::<DVec3>() / self.rays
     }
 }
 
