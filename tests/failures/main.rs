@@ -17,6 +17,7 @@ mod contact;
 mod degenerate;
 mod density;
 mod emitter;
+mod gap;
 mod growth;
 mod nothing;
 mod placing;
