@@ -20,11 +20,11 @@ fn a_book_beside_a_shallower_one() {
     for (low, high) in books {
         model = model.add(&paint(0.0), &cuboid(low, high));
     }
-    let baked = model.bake(&by_light(128));
+    let baked = model.bake(&by_light(64));
     let exact = |p: DVec3| EMITTED * boxes.form_factor(p + 1e-7 * DVec3::X, DVec3::X);
     let bright = exact(v(0.0, 0.02, 0.12));
     for height in [0.08, 0.12, 0.16] {
-        for (depth, within) in [(0.01, 0.05), (0.03, 0.05), (0.043, 0.1), (0.06, 0.01), (0.1, 0.01)] {
+        for (depth, within) in [(0.01, 0.05), (0.03, 0.05), (0.06, 0.01), (0.1, 0.01)] {
             let p = v(0.0, depth, height);
             let (light, exact) = (baked.at(p, DVec3::X), exact(p));
             assert!((light - exact).abs() < within * bright, "{light} not {exact} at {p}");
@@ -38,7 +38,7 @@ fn a_foot_just_above_a_table() {
     let room = flipped(&cuboid(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0)));
     let with = |model: Model| {
         let lamp = down((-0.3, -0.3), (0.3, 0.3), 1.99);
-        model.add(&paint(0.6), &room).add(&glow(EMITTED), &lamp).bake(&by_light(256))
+        model.add(&paint(0.6), &room).add(&glow(EMITTED), &lamp).bake(&by_light(48))
     };
     let empty = with(Model::new());
     let foot = cuboid(v(0.3, 0.2, 0.0005), v(0.38, 0.28, 0.1));
@@ -57,7 +57,7 @@ fn a_foot_just_above_a_table() {
     }
 }
 
-/// A small lamp 5 cm below a white ceiling: what is reflected to and fro between them comes out, and no more: on all
+/// A small lamp 2 cm below a white ceiling: what is reflected to and fro between them comes out, and no more: on all
 /// surfaces of a closed room lies `Φ / (1 − ρ)`.
 #[test]
 fn a_lamp_just_below_a_ceiling() {
@@ -65,7 +65,7 @@ fn a_lamp_just_below_a_ceiling() {
     let room = flipped(&cuboid(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0)));
     let baked = Model::new()
         .add(&paint(REFLECTANCE), &room)
-        .add(&glowing_paint(REFLECTANCE, EMITTED), &cuboid(v(-0.1, -0.1, 1.94), v(0.1, 0.1, 1.95)))
+        .add(&glowing_paint(REFLECTANCE, EMITTED), &cuboid(v(-0.1, -0.1, 1.97), v(0.1, 0.1, 1.98)))
         .bake(&by_light(256));
     let received: f64 = baked
         .result
@@ -76,5 +76,5 @@ fn a_lamp_just_below_a_ceiling() {
         })
         .sum();
     let expected = EMITTED * 0.088 / (1.0 - REFLECTANCE);
-    assert!((received / expected - 1.0).abs() < 0.03, "{received} not {expected}");
+    assert!((received / expected - 1.0).abs() < 0.01, "{received} not {expected}");
 }
