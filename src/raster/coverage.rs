@@ -168,8 +168,7 @@ fn part_of(triangle: [DVec2; 3], outer: [bool; 3], outline: &Ring) -> Vec<([DVec
     if ring == triangle {
         return vec![(triangle, own)];
     }
-    let last = ring.len() - 1;
-    let fan = (2..ring.len()).map(|k| ([0, k - 1, k], [k == 2, true, k == last]));
+    let fan = (2..ring.len()).map(|k| ([0, k - 1, k], [k == 2, true, k + 1 == ring.len()]));
     let margin = |a: DVec2, b: DVec2| {
         let middle = 0.5 * (a + b);
         let near = |&i: &usize| {
