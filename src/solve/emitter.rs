@@ -17,8 +17,8 @@ use crate::surface::SmoothNormals;
 use crate::trace::shaft::Shaft;
 use crate::trace::{FanStack, Tracer};
 
-use rays::grid_points;
-pub use rays::{RayGrid, irradiance_by_rays};
+use rays::{Ray, grid_points};
+pub use rays::{RayGrid, seen_by_rays};
 pub(super) use rays::{fan_area, point_in_fan};
 
 /// How hard to look.
@@ -109,8 +109,7 @@ impl Effort {
 pub struct Evaluation {
     workspace: Workspace,
     stack: FanStack,
-    /// Where shadow rays end, and what arrives along them.
-    rays: Vec<(DVec3, DVec3)>,
+    rays: Vec<Ray>,
     precision: Precision,
     /// What was done so far.
     pub effort: Effort,

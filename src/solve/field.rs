@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::hot::HotSpots;
 use super::locate::{Descent, FacetLocator, Node};
+use super::patches::Receiver;
 use crate::element::{Element, Facet, NONE, Side};
 use crate::geom::Frame;
 use crate::light::luminance;
@@ -44,6 +45,16 @@ pub struct RadiosityField<'a> {
     roots: Vec<u32>,
     /// Of hot leaves, by the number of their patch: what the cap took.
     excess: HashMap<u32, FieldPatch>,
+    reading: Reading,
+}
+
+/// How what elements received becomes radiosity.
+#[derive(Clone, Copy)]
+struct Reading {
+    /// Of direct light.
+    scale: DVec3,
+    /// Luminance of what rays read, at most.
+    cap: f64,
 }
 
 /// A place that a ray met. It is the same in every field of elements that were not split since.
@@ -103,11 +114,12 @@ impl<'a> RadiosityField<'a> {
             patches: Vec::new(),
             roots: Vec::with_capacity(facets.len()),
             excess: HashMap::new(),
+            reading: Reading { scale: direct_scale, cap: hot.cap },
         };
         let trees: Vec<Tree> = facets
             .par_iter()
             .zip(hot.leaves(facets))
-            .map(|(facet, is_hot)| Tree::new(facet, &surfaces[facet.surface], &is_hot, direct_scale, hot.cap))
+            .map(|(facet, is_hot)| Tree::new(facet, &surfaces[facet.surface], &is_hot, field.reading))
             .collect();
         trees.into_iter().for_each(|tree| field.take(tree));
         let mut first = 0;
@@ -119,6 +131,26 @@ impl<'a> RadiosityField<'a> {
             }
         }
         field
+    }
+
+    /// Takes down anew what these elements received, by facet; none was split since.
+    pub fn renew(&mut self, facets: &[Facet], elements: &[Vec<Receiver>]) {
+        let of = |(index, (facet, elements)): (usize, (&Facet, &Vec<Receiver>))| -> Vec<_> {
+            let min = self.sides[side_number((index, facet.surface, facet.side))].min;
+            let leaves = elements.iter().flat_map(|receiver| facet.leaves_of(receiver.element));
+            let read = |leaf: u32| {
+                let middle = facet.elements[leaf as usize].centroid - min;
+                let number = self.patch_from(self.roots[index], middle.as_vec2());
+                let is_hot = self.excess.contains_key(&number);
+                (number, self.reading.of((facet, leaf), min, is_hot))
+            };
+            leaves.map(read).collect()
+        };
+        let renewed: Vec<_> = facets.par_iter().zip(elements).enumerate().map(of).collect();
+        for (number, (patch, excess)) in renewed.into_iter().flatten() {
+            self.patches[number as usize] = patch;
+            self.excess.extend(excess.map(|excess| (number, excess)));
+        }
     }
 
     fn take(&mut self, tree: Tree) {
@@ -295,7 +327,7 @@ struct Tree {
 }
 
 impl Tree {
-    fn new(facet: &Facet, surface: &Surface, is_hot: &[bool], direct_scale: DVec3, cap: f64) -> Self {
+    fn new(facet: &Facet, surface: &Surface, is_hot: &[bool], reading: Reading) -> Self {
         let (_, min, _) = plane_of(surface, facet.side);
         let (mut inner, mut leaves) = (0, 0);
         let numbers: Vec<u32> = facet
@@ -316,23 +348,35 @@ impl Tree {
         let nodes = nodes.collect();
         let (mut patches, mut excess) = (Vec::with_capacity(leaves as usize), Vec::new());
         for leaf in facet.leaves() {
-            let e = &facet.elements[leaf as usize];
-            let radiosity = |p| {
-                let (direct, indirect) = facet.received(leaf, p);
-                e.reflectance * (direct * direct_scale + indirect)
-            };
-            let (corners, middle) = (e.corners().map(radiosity), radiosity(0.5 * (e.min + e.max)));
-            let whole = FieldPatch::new(e, min, corners, middle);
-            let number = patches.len() as u32;
-            patches.push(if is_hot[leaf as usize] {
-                let cool = FieldPatch::new(e, min, corners.map(|c| capped(c, cap)), capped(middle, cap));
-                excess.push((number, whole.without(&cool)));
-                cool
-            } else {
-                whole
-            });
+            let (patch, beyond) = reading.of((facet, leaf), min, is_hot[leaf as usize]);
+            excess.extend(beyond.map(|beyond| (patches.len() as u32, beyond)));
+            patches.push(patch);
         }
         Self { root: numbers[0], nodes, patches, excess }
+    }
+}
+
+impl Reading {
+    /// A leaf's patch, relative to `origin`, and what the cap takes of a hot one.
+    fn of(
+        &self,
+        (facet, leaf): (&Facet, u32),
+        origin: DVec2,
+        is_hot: bool,
+    ) -> (FieldPatch, Option<FieldPatch>) {
+        let e = &facet.elements[leaf as usize];
+        let radiosity = |p| {
+            let (direct, indirect) = facet.received(leaf, p);
+            e.reflectance * (direct * self.scale + indirect)
+        };
+        let (corners, middle) = (e.corners().map(radiosity), radiosity(0.5 * (e.min + e.max)));
+        let whole = FieldPatch::new(e, origin, corners, middle);
+        if !is_hot {
+            return (whole, None);
+        }
+        let cap = |colour| capped(colour, self.cap);
+        let cool = FieldPatch::new(e, origin, corners.map(cap), cap(middle));
+        (cool, Some(whole.without(&cool)))
     }
 }
 

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 use super::budget::{Contrasts, Leniency, Round, level_for};
 use super::contact::{Covered, Nearby};
 use super::direct::DirectPass;
-use super::emitter::{Evaluation, Precision, irradiance_by_rays};
-use super::field::{Met, RadiosityField};
+use super::emitter::{Evaluation, Precision, seen_by_rays};
+use super::field::RadiosityField;
 use super::form_factor::SurfacePoint;
 use super::hemisphere::{Directions, Level};
 use super::hot::HotSpot;
@@ -123,6 +123,8 @@ pub struct Source<'a> {
     pub field: &'a RadiosityField<'a>,
     /// What is too bright and too small for them.
     pub hot_spots: &'a [HotSpot],
+    /// Luminance of reflected radiosity up to which rays read it from the field.
+    pub cap: f64,
     /// Where all places look.
     pub directions: &'a Directions,
 }
@@ -164,7 +166,7 @@ pub fn gather(
                 enclosed: Vec::new(),
                 sights,
                 stack: FanStack::default(),
-                met: Vec::new(),
+                spare: Sight::default(),
                 nearby: Nearby::default(),
                 evaluation: Evaluation::new(Precision::HOT_SPOT),
                 places: vec![None; facet.samples.len()],
@@ -201,8 +203,8 @@ struct Gathering<'a> {
     /// What places saw that are asked again, if it is kept.
     sights: Option<&'a mut Sights>,
     stack: FanStack,
-    /// Memory for what a place meets.
-    met: Vec<(Met, f32)>,
+    /// Memory for what a place sees.
+    spare: Sight,
     nearby: Nearby,
     /// For hot spots.
     evaluation: Evaluation,
@@ -437,40 +439,33 @@ impl Gathering<'_> {
     fn again(&mut self, place: Place, point: SurfacePoint) -> Gathered {
         let Some(sights) = &self.sights else { return self.at(point) };
         if let Some(sight) = sights.get(&place) {
-            let seen = self.seen(sight);
             self.counts.places += 1;
-            return self.with_hot_spots(point, seen);
+            return self.gathered(sight, point);
         }
-        let sight = self.look(point);
-        let seen = self.seen(&sight);
+        // Hot spots may lie in gaps, too, and shine when light has come there.
+        let sight = self.look(point, self.source.cap);
+        let gathered = self.gathered(&sight, point);
         if let Some(sights) = &mut self.sights {
             sights.insert(place, sight);
         }
-        self.with_hot_spots(point, seen)
+        gathered
     }
 
     fn at(&mut self, point: SurfacePoint) -> Gathered {
-        let sight = self.look(point);
-        let seen = self.seen(&sight);
-        self.met = sight.met;
-        self.with_hot_spots(point, seen)
+        let sight = self.look(point, 0.0);
+        let gathered = self.gathered(&sight, point);
+        self.spare = sight;
+        gathered
     }
 
-    fn seen(&self, sight: &Sight) -> Gathered {
-        let Sight { distance, is_enclosed, .. } = *sight;
-        Gathered { irradiance: sight.irradiance(self.source.field), distance, is_enclosed }
-    }
-
-    /// Hot spots may lie in gaps, too, and shine as the field says.
-    fn with_hot_spots(&mut self, point: SurfacePoint, seen: Gathered) -> Gathered {
+    fn gathered(&self, sight: &Sight, point: SurfacePoint) -> Gathered {
         let Source { field, hot_spots, .. } = self.source;
-        let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
-        let spots = hot_spots.iter().map(|s| (&s.emitter, || s.exitance_at(point.position, field)));
-        let hot = irradiance_by_rays(spots, point, self.pass.tracer, negligible, &mut self.evaluation);
-        Gathered { irradiance: seen.irradiance + hot, ..seen }
+        let Sight { distance, is_enclosed, .. } = *sight;
+        Gathered { irradiance: sight.irradiance(point.position, field, hot_spots), distance, is_enclosed }
     }
 
-    fn look(&mut self, point: SurfacePoint) -> Sight {
+    /// What is seen at a place, hot spots as if none shone less than with `least_exitance`.
+    fn look(&mut self, point: SurfacePoint, least_exitance: f64) -> Sight {
         let tracer = self.pass.tracer;
         let fans = self.source.directions.fans(self.level);
         let smooth = self.facet.smooth.as_deref();
@@ -481,7 +476,7 @@ impl Gathering<'_> {
         let (mut nearness, mut near) = (0.0, 0_u32);
         let (reach, surface) = (self.receiver.reach, self.facet.surface);
         let field = self.source.field;
-        let mut met = std::mem::take(&mut self.met);
+        let Sight { mut met, mut hot, .. } = std::mem::take(&mut self.spare);
         met.clear();
         tracer.look(point.position, [u, v, normal], fans, &mut self.stack, |hit, at, share| {
             met.extend(field.met(tracer, (hit, at), normal).map(|met| (met, share as f32)));
@@ -491,11 +486,15 @@ impl Gathering<'_> {
             nearness += share / hit.distance.max(tracer.margin());
             near += u32::from(hit.distance < reach);
         });
+        let shining = |s: &HotSpot| s.emitter.exitance().max_element().max(least_exitance);
+        let spots = self.source.hot_spots.iter().map(|s| (&s.emitter, shining(s)));
+        let negligible = HOT_NEGLIGIBLE * LEAST_REFERENCE * self.pass.typical;
+        seen_by_rays(spots, point, tracer, negligible, &mut self.evaluation, &mut hot);
         let rays = self.level.rays() as f64;
         self.counts.places += 1;
         self.counts.contrasts.add(self.contrast, 1);
         self.counts.rays += self.level.rays() as u64;
         let is_enclosed = f64::from(near) > ENCLOSED * rays;
-        Sight { met, rays, distance: rays / nearness, is_enclosed }
+        Sight { met, hot, rays, distance: rays / nearness, is_enclosed }
     }
 }

@@ -195,13 +195,13 @@ fn gather_reflected(
     let mut counts = GatherCounts::default();
     let area: f64 = surfaces.iter().map(|s| s.area).sum();
     let texels = area / texel.powi(2);
+    let field_of = |facets: &[Facet]| RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
     let gather_from = |receivers: &[Vec<Receiver>],
                        round: (Round, f64),
-                       seen: Option<&mut [Sights]>,
+                       (field, seen): (&RadiosityField, Option<&mut [Sights]>),
                        facets: &mut [Facet]| {
-        let field = RadiosityField::new(locator, surfaces, facets, &hot, direct_scale);
-        let hot_spots = hot.shining(&field, facets);
-        let source = Source { field: &field, hot_spots: &hot_spots, directions: &directions };
+        let hot_spots = hot.shining(field, facets);
+        let source = Source { field, hot_spots: &hot_spots, cap: hot.cap, directions: &directions };
         let (own, unsettled) = gather(pass, source, receivers, round, seen, facets);
         tracing::debug!(?round, places = own.places, rays = own.rays, "gathered");
         (own, unsettled)
@@ -209,17 +209,19 @@ fn gather_reflected(
     let mut gaps_are_dark = false;
     let mut approach = |round: Round, done: f64, facets: &mut [Facet]| {
         let before = shadings(facets);
-        let (own, mut gaps) = gather_from(&receivers, (round, ANY), None, facets);
+        let field = field_of(facets);
+        let (own, mut gaps) = gather_from(&receivers, (round, ANY), (&field, None), facets);
         counts.add(&own);
         if !std::mem::replace(&mut gaps_are_dark, true) {
             // What patches say of narrow gaps may be off by any amount. Light comes in from outside.
             darken(&gaps, facets);
         }
-        let mut seen = sights(&gaps);
+        let (mut field, mut seen) = (field_of(facets), sights(&gaps));
         for _ in 0..MOST_SWEEPS {
             let round = (Round::in_gaps(round), UNSETTLED);
-            let (own, left) = gather_from(&gaps, round, seen.as_deref_mut(), facets);
+            let (own, left) = gather_from(&gaps, round, (&field, seen.as_deref_mut()), facets);
             counts.add(&own);
+            field.renew(facets, &gaps);
             gaps = left;
             if gaps.iter().all(Vec::is_empty) {
                 break;
@@ -244,7 +246,8 @@ fn gather_reflected(
         }
     };
     tracing::debug!(error, "affordable");
-    counts.add(&gather_from(&receivers, (Round::last(error), ANY), None, facets).0);
+    let field = field_of(facets);
+    counts.add(&gather_from(&receivers, (Round::last(error), ANY), (&field, None), facets).0);
     if !progress(1.0) {
         return None;
     }

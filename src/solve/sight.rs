@@ -9,6 +9,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::field::{Met, RadiosityField};
+use super::hot::HotSpot;
 use super::patches::Receiver;
 
 /// No more rays than about this many are kept, 16 bytes each.
@@ -31,6 +32,8 @@ pub enum Place {
 pub struct Sight {
     /// What its rays meet that may shine, each with the share of its light that arrives.
     pub met: Vec<(Met, f32)>,
+    /// The numbers of the hot spots in sight, and their form factors.
+    pub hot: Vec<(u32, f32)>,
     /// Its rays.
     pub rays: f64,
     /// Harmonic mean distance of what the rays met, metres.
@@ -40,11 +43,14 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// The irradiance there, without that from hot spots.
+    /// The irradiance at the place, which is that of the sight.
     #[must_use]
-    pub fn irradiance(&self, field: &RadiosityField) -> DVec3 {
-        let of = |(met, share): &(Met, f32)| f64::from(*share) * field.radiosity_met(met).as_dvec3();
-        self.met.iter().map(of).sum::<DVec3>() / self.rays
+    pub fn irradiance(&self, place: DVec3, field: &RadiosityField, hot_spots: &[HotSpot]) -> DVec3 {
+        let met = |(met, share): &(Met, f32)| f64::from(*share) * field.radiosity_met(met).as_dvec3();
+        let hot = |&(spot, form_factor): &(u32, f32)| {
+            f64::from(form_factor) * hot_spots[spot as usize].exitance_at(place, field)
+        };
+        self.met.iter().map(met).sum::<DVec3>() / self.rays + self.hot.iter().map(hot).sum::<DVec3>()
     }
 }
 

@@ -44,13 +44,8 @@ impl Parts {
         self.count == 0
     }
 
-    /// The part, if there is one only.
-    fn only(&self) -> Option<&Part> {
-        if self.count == 1 { self.parts.first() } else { None }
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &Part> {
-        self.parts[..self.count].iter()
+    fn as_slice(&self) -> &[Part] {
+        &self.parts[..self.count]
     }
 
     /// Where the next part may be put; it counts once it is [kept](Self::keep).
@@ -67,14 +62,23 @@ impl Parts {
             self.count += 1;
         }
     }
+
+    /// Moves a part out, whose place the last one takes.
+    fn take(&mut self, index: usize, to: &mut Part) {
+        to.copy_from(&self.parts[index]);
+        self.count -= 1;
+        let (before, last) = self.parts.split_at_mut(self.count);
+        if let Some(part) = before.get_mut(index) {
+            part.copy_from(&last[0]);
+        }
+    }
 }
 
 /// Memory that is kept between calls.
 #[derive(Default)]
 pub struct Workspace {
     parts: Parts,
-    next: Parts,
-    scratch: [Part; 3],
+    scratch: [Part; 5],
 }
 
 /// The emitter that [`visible_form_factor`] looks at: convex parts in one plane.
@@ -107,68 +111,60 @@ pub fn visible_form_factor<'t>(
         return Some(0.0); // behind the emitter
     }
     let near_side = plane_offset + emitter.margin.min(-0.5 * plane_offset);
-    let Workspace { parts, next, scratch } = workspace;
-    let [whole, above, shade] = scratch;
+    let Workspace { parts, scratch } = workspace;
+    let [whole, above, near, halves @ ..] = scratch;
     parts.clear();
     for part in emitter.parts {
         whole.fill(part.iter().map(|&v| v - x))?;
         whole.cut(receiver.normal, 0.0, parts.next())?;
         parts.keep();
     }
-    let around = match parts.only() {
-        Some(part) => Pyramid::over(part),
-        None => Pyramid::EMPTY,
+    let around = match parts.as_slice() {
+        [part] => Pyramid::over(part),
+        _ => Pyramid::EMPTY,
     };
     for occluder in occluders {
         if parts.is_empty() {
             return Some(0.0);
         }
         whole.fill(occluder.iter().map(|&v| v - x))?;
-        if around.sides().iter().any(|&side| whole.is_outside(side)) {
+        if around.sides().iter().any(|&side| whole.side_of(side) == Side::Outside) {
             continue;
         }
         // What casts a shadow is above the horizon and on this side of the emitter's plane.
-        whole.cut(receiver.normal, 0.0, above)?;
-        above.cut(emitter.normal, near_side, shade)?;
-        if shade.count >= 3 {
-            subtract(shade, parts, next, [whole, above])?;
+        let shade = whole.within(receiver.normal, 0.0, above)?.within(emitter.normal, near_side, near)?;
+        if shade.count >= 3 && !is_flat(shade) {
+            subtract(&Pyramid::over(shade), parts, halves)?;
         }
     }
     let seen_from_x = SurfacePoint { position: DVec3::ZERO, normal: receiver.normal };
-    let sum: f64 = parts.iter().map(|p| signed_point_to_polygon(seen_from_x, p.corners())).sum();
+    let sum: f64 = parts.as_slice().iter().map(|p| signed_point_to_polygon(seen_from_x, p.corners())).sum();
     Some(sum.clamp(0.0, 1.0))
 }
 
-/// Removes from all parts what lies in the pyramid over `shade` with its tip in the origin.
-fn subtract(shade: &Part, parts: &mut Parts, next: &mut Parts, scratch: [&mut Part; 2]) -> Option<()> {
-    if is_flat(shade) {
-        return Some(()); // the point lies in the occluder's plane, so it covers no angle
-    }
-    let pyramid = Pyramid::over(shade);
-    let sides = pyramid.sides();
-    next.clear();
-    let [rest, inside] = scratch;
-    for part in parts.iter() {
-        if sides.iter().any(|&s| part.is_outside(s)) {
-            next.next().copy_from(part);
-            next.keep();
+/// Removes from all parts what lies in the pyramid.
+fn subtract(pyramid: &Pyramid, parts: &mut Parts, [rest, inside]: &mut [Part; 2]) -> Option<()> {
+    let (mut rest, mut inside) = (rest, inside);
+    // From the last: what takes the place of a dropped one has had its turn, or lies outside.
+    for index in (0..parts.count).rev() {
+        let part = &parts.parts[index];
+        let mut cutting = 0_u32;
+        let is_outside = pyramid.sides().iter().enumerate().any(|(k, &side)| {
+            let of = part.side_of(side);
+            cutting |= u32::from(of == Side::Both) << k;
+            of == Side::Outside
+        });
+        if is_outside {
             continue;
         }
-        rest.copy_from(part);
-        for &side in sides {
-            if rest.is_inside(side) {
-                continue;
-            }
-            rest.cut(-side, 0.0, next.next())?;
-            next.keep();
-            rest.cut(side, 0.0, inside)?;
-            rest.copy_from(inside);
-            if rest.count < 3 {
-                break;
-            }
+        parts.take(index, rest);
+        while cutting != 0 && rest.count >= 3 {
+            rest.split(pyramid.sides[cutting.trailing_zeros() as usize], parts.next(), inside)?;
+            parts.keep();
+            std::mem::swap(&mut rest, &mut inside);
+            cutting &= cutting - 1;
         }
     }
-    std::mem::swap(parts, next);
     Some(())
 }
 
@@ -200,6 +196,14 @@ impl Pyramid {
     fn sides(&self) -> &[DVec3] {
         &self.sides[..self.count]
     }
+}
+
+/// Where a polygon lies.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Outside,
+    Inside,
+    Both,
 }
 
 /// Whether the origin lies in the polygon's plane, so that its pyramid has no volume.
@@ -239,12 +243,51 @@ impl Part {
         &self.corners[..self.count]
     }
 
-    fn is_outside(&self, side: DVec3) -> bool {
-        self.corners().iter().all(|c| c.dot(side) <= 0.0)
+    /// On which side of a plane through the origin, whose normal points inwards, it lies.
+    fn side_of(&self, side: DVec3) -> Side {
+        let (mut is_inside, mut is_outside) = (true, true);
+        for corner in self.corners() {
+            let height = corner.dot(side);
+            is_inside &= height >= 0.0;
+            is_outside &= height <= 0.0;
+        }
+        match (is_outside, is_inside) {
+            (true, _) => Side::Outside,
+            (false, true) => Side::Inside,
+            (false, false) => Side::Both,
+        }
     }
 
-    fn is_inside(&self, side: DVec3) -> bool {
-        self.corners().iter().all(|c| c.dot(side) >= 0.0)
+    /// What of it lies where `normal · p ≥ offset`: itself, or cut in `room`. `None` as for [`Self::cut`].
+    fn within<'p>(&'p self, normal: DVec3, offset: f64, room: &'p mut Self) -> Option<&'p Self> {
+        if self.corners().iter().all(|c| normal.dot(*c) >= offset) {
+            return Some(self);
+        }
+        self.cut(normal, offset, room)?;
+        Some(room)
+    }
+
+    /// Divides it along a plane through the origin. `None` where a half has too many corners.
+    fn split(&self, side: DVec3, outside: &mut Self, inside: &mut Self) -> Option<()> {
+        (outside.count, inside.count) = (0, 0);
+        let Some(&last) = self.corners().last() else { return Some(()) };
+        let (mut a, mut height_a) = (last, side.dot(last));
+        for &b in self.corners() {
+            let height_b = side.dot(b);
+            if height_a * height_b < 0.0 {
+                let crossing = a.lerp(b, height_a / (height_a - height_b));
+                outside.push(crossing)?;
+                inside.push(crossing)?;
+            }
+            if height_b <= 0.0 {
+                outside.push(b)?;
+            }
+            if height_b >= 0.0 {
+                inside.push(b)?;
+            }
+            (a, height_a) = (b, height_b);
+        }
+        Some(())
     }
 
     /// Puts the part of this polygon where `normal · p ≥ offset` into `out`; `None` where it has too many corners.

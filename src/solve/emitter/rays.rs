@@ -27,26 +27,33 @@ impl RayGrid {
     }
 }
 
+/// A shadow ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ray {
+    /// Where it ends.
+    to: DVec3,
+    /// Of the form factor, what it stands for.
+    part: f64,
+    /// Number of what it ends at.
+    emitter: u32,
+}
+
 /// What is this many of its diameters away is far.
 const FAR: f64 = 5.0;
 
 impl Evaluation {
-    /// What arrives at `receiver` along those of the rays that nothing stops.
-    fn seen_along_rays(&mut self, receiver: SurfacePoint, tracer: &Tracer) -> DVec3 {
-        let mut seen = DVec3::ZERO;
+    /// Tells `give` the ray and the share of its light, above 0, that nothing stops on the way to `receiver`, of all
+    /// its rays.
+    fn see_along_rays(&mut self, receiver: SurfacePoint, tracer: &Tracer, mut give: impl FnMut(Ray, f64)) {
         for rays in self.rays.chunks(FAN) {
             let mut to = [DVec3::ZERO; FAN];
-            to.iter_mut().zip(rays).for_each(|(to, ray)| *to = ray.0);
+            to.iter_mut().zip(rays).for_each(|(to, ray)| *to = ray.to);
             let arriving = tracer.arriving_all(receiver.position, &to[..rays.len()], &mut self.stack);
-            seen += rays
-                .iter()
-                .zip(arriving)
-                .filter(|(_, arriving)| *arriving > 0.0)
-                .map(|(ray, arriving)| ray.1 * arriving)
-                .sum::<DVec3>();
+            for (ray, arriving) in rays.iter().zip(arriving).filter(|(_, arriving)| *arriving > 0.0) {
+                give(*ray, arriving);
+            }
         }
         self.effort.rays += self.rays.len() as u64;
-        seen
     }
 }
 
@@ -58,11 +65,13 @@ impl AreaEmitter {
         tracer: &Tracer,
         e: &mut Evaluation,
     ) -> f64 {
-        let grid = e.precision.rays;
-        let all = self.told_by_points(receiver, grid);
         e.rays.clear();
-        self.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, DVec3::splat(part / all))));
-        e.seen_along_rays(receiver, tracer).x
+        let grid = e.precision.rays;
+        self.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push(Ray { to, part, emitter: 0 }));
+        let all: f64 = e.rays.iter().map(|ray| ray.part).sum();
+        let mut seen = 0.0;
+        e.see_along_rays(receiver, tracer, |ray, arriving| seen += ray.part * arriving);
+        if all > 0.0 { seen / all } else { 0.0 }
     }
 
     /// Of the light that solid triangles do not stop, the kernel-weighted share that screens let through.
@@ -84,11 +93,6 @@ impl AreaEmitter {
         if unblocked > 0.0 { through / unblocked } else { 1.0 }
     }
 
-    /// The form factor from `receiver` with nothing between, as its points tell it.
-    fn told_by_points(&self, receiver: SurfacePoint, grid: RayGrid) -> f64 {
-        self.grids[grid as usize].iter().map(|&(q, share)| share * self.kernel(receiver, q)).sum()
-    }
-
     /// What the form factor from `receiver` would be if all of it were at `q`.
     fn kernel(&self, receiver: SurfacePoint, q: DVec3) -> f64 {
         let d = q - receiver.position;
@@ -107,6 +111,12 @@ impl AreaEmitter {
                 give(q + lift, part);
             }
         }
+    }
+
+    /// Whether none of it is before the receiver, or that behind it.
+    fn is_turned_away(&self, receiver: SurfacePoint) -> bool {
+        let SurfacePoint { position, normal } = receiver;
+        self.frame.height(position) <= 0.0 || self.hull.iter().all(|q| normal.dot(q - position) <= 0.0)
     }
 
     /// Whether it is so far away that few points tell its form factor to a hundredth.
@@ -133,27 +143,41 @@ pub(super) fn grid_points(parts: &[Vec<DVec3>], grid: RayGrid) -> Vec<(DVec3, f6
     points
 }
 
-/// The irradiance that all `emitters` give to `receiver`, visibility counted by a few rays each; without those that
-/// would give no more than `negligible` with nothing between. Each shines with the exitance given beside it.
-#[must_use]
-pub fn irradiance_by_rays<'t, E: FnOnce() -> DVec3>(
-    emitters: impl Iterator<Item = (&'t AreaEmitter, E)>,
+/// What `receiver` sees of all `emitters` that matter, as form factors by the emitters' numbers in ascending order,
+/// visibility counted by a few rays each. With nothing between, those that are left out would give no more than
+/// `negligible` if they shone with the exitance beside them.
+pub fn seen_by_rays<'t>(
+    emitters: impl Iterator<Item = (&'t AreaEmitter, f64)>,
     receiver: SurfacePoint,
     tracer: &Tracer,
     negligible: f64,
     e: &mut Evaluation,
-) -> DVec3 {
+    seen: &mut Vec<(u32, f32)>,
+) {
     e.rays.clear();
-    for (emitter, exitance) in emitters {
-        let grid = e.precision.rays;
-        let told = emitter.told_by_points(receiver, grid);
+    for ((emitter, exitance), number) in emitters.zip(0..) {
+        if emitter.is_turned_away(receiver) {
+            continue;
+        }
+        let first = e.rays.len();
+        let mut push = |to, part| e.rays.push(Ray { to, part, emitter: number });
+        emitter.aim(receiver, tracer.margin(), e.precision.rays, &mut push);
+        let told: f64 = e.rays[first..].iter().map(|ray| ray.part).sum();
         let form_factor = if emitter.is_far(receiver.position) { told } else { emitter.unoccluded(receiver) };
-        if told > 0.0 && emitter.exitance.max_element() * form_factor > negligible {
-            let arriving = exitance() * (form_factor / told);
-            emitter.aim(receiver, tracer.margin(), grid, |to, part| e.rays.push((to, arriving * part)));
+        if exitance * form_factor > negligible {
+            e.rays[first..].iter_mut().for_each(|ray| ray.part *= form_factor / told);
+        } else {
+            e.rays.truncate(first);
         }
     }
-    e.seen_along_rays(receiver, tracer)
+    seen.clear();
+    e.see_along_rays(receiver, tracer, |ray, arriving| {
+        let form_factor = (ray.part * arriving) as f32;
+        match seen.last_mut() {
+            Some((emitter, sum)) if *emitter == ray.emitter => *sum += form_factor,
+            _ => seen.push((ray.emitter, form_factor)),
+        }
+    });
 }
 
 pub(in crate::solve) fn fan_area(part: &[DVec3]) -> f64 {
