@@ -165,6 +165,12 @@ impl AreaEmitter {
         self.parts.iter().map(|p| signed_point_to_polygon(receiver, p)).sum::<f64>().clamp(0.0, 1.0)
     }
 
+    /// As [`Emitter::is_behind_from`].
+    fn is_behind_from(&self, lowest: DVec3, corners: &[DVec3], normal: DVec3, margin: f64) -> bool {
+        self.hull.iter().all(|&q| normal.dot(q - lowest) <= margin)
+            || corners.iter().all(|&p| self.frame.height(p) <= margin)
+    }
+
     fn visible(
         &self,
         receiver: SurfacePoint,
@@ -352,10 +358,7 @@ impl Emitter {
     /// the one that lies farthest back.
     fn is_behind_from(&self, lowest: DVec3, corners: &[DVec3], normal: DVec3, margin: f64) -> bool {
         match self {
-            Self::Area(area) => {
-                area.hull.iter().all(|&q| normal.dot(q - lowest) <= margin)
-                    || corners.iter().all(|&p| area.frame.height(p) <= margin)
-            }
+            Self::Area(area) => area.is_behind_from(lowest, corners, normal, margin),
             Self::Punctual(light) => match light.kind {
                 PunctualKind::Directional { direction } => normal.dot(direction) >= 0.0,
                 PunctualKind::Point { position, .. } | PunctualKind::Spot { position, .. } => {

@@ -12,7 +12,8 @@ use super::field::{Met, RadiosityField};
 use super::hot::HotSpot;
 use super::patches::Receiver;
 
-/// No more rays than about this many are kept, 16 bytes each.
+/// No more rays than about this many are kept, 16 bytes each; hot spots, at most 8 bytes each for 128 of them at
+/// each place, take less.
 const MOST_KEPT: usize = 1 << 24;
 
 /// An element in a gap, which shares its places with its neighbours, has about so many.

@@ -145,7 +145,7 @@ pub fn visible_form_factor<'t>(
 /// Removes from all parts what lies in the pyramid.
 fn subtract(pyramid: &Pyramid, parts: &mut Parts, [rest, inside]: &mut [Part; 2]) -> Option<()> {
     let (mut rest, mut inside) = (rest, inside);
-    // From the last: what takes the place of a dropped one has had its turn, or lies outside.
+    // From the last: what takes the place of one that is taken has had its turn, or lies outside.
     for index in (0..parts.count).rev() {
         let part = &parts.parts[index];
         let mut cutting = 0_u32;

@@ -113,12 +113,6 @@ impl AreaEmitter {
         }
     }
 
-    /// Whether none of it is before the receiver, or that behind it.
-    fn is_turned_away(&self, receiver: SurfacePoint) -> bool {
-        let SurfacePoint { position, normal } = receiver;
-        self.frame.height(position) <= 0.0 || self.hull.iter().all(|q| normal.dot(q - position) <= 0.0)
-    }
-
     /// Whether it is so far away that few points tell its form factor to a hundredth.
     fn is_far(&self, from: DVec3) -> bool {
         let nearest = self.hull.iter().map(|q| q.distance_squared(from)).fold(f64::INFINITY, f64::min);
@@ -154,9 +148,10 @@ pub fn seen_by_rays<'t>(
     e: &mut Evaluation,
     seen: &mut Vec<(u32, f32)>,
 ) {
+    let SurfacePoint { position, normal } = receiver;
     e.rays.clear();
     for ((emitter, exitance), number) in emitters.zip(0..) {
-        if emitter.is_turned_away(receiver) {
+        if emitter.is_behind_from(position, &[position], normal, 0.0) {
             continue;
         }
         let first = e.rays.len();
