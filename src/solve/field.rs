@@ -422,3 +422,89 @@ fn capped(colour: DVec3, cap: f64) -> DVec3 {
     let luminance = luminance(colour);
     if luminance > cap { colour * (cap / luminance) } else { colour }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::{MeshOptions, Shading, SurfaceAppearance, build};
+    use crate::geom::polygon::rectangle;
+    use crate::solve::patches::Patches;
+    use crate::surface::Region;
+
+    const PATCH: f64 = 0.25;
+    const REFLECTANCE: f64 = 0.5;
+
+    struct Grey;
+
+    impl SurfaceAppearance for Grey {
+        fn reflectance(&self, _: usize, _: DVec2, _: DVec2) -> DVec3 {
+            DVec3::splat(REFLECTANCE)
+        }
+
+        fn exitance(&self, _: usize, _: DVec2, _: DVec2) -> DVec3 {
+            DVec3::ZERO
+        }
+    }
+
+    /// A floor of 4 m × 2 m.
+    fn floor() -> Surface {
+        let ring = rectangle(DVec2::ZERO, DVec2::new(4.0, 2.0));
+        let [a, b, c, d] = ring;
+        let region = Region { rings: vec![ring.to_vec()], triangles: vec![[a, b, c], [a, c, d]], area: 8.0 };
+        Surface {
+            placement: 0,
+            material: 0,
+            frame: Frame::new(DVec3::ZERO, DVec3::Z, DVec3::X),
+            rings: region.rings.clone(),
+            source_triangles: vec![0, 1],
+            regions: vec![region],
+            area: 8.0,
+            smooth: None,
+            double_sided: false,
+        }
+    }
+
+    /// Where light changed, hot or not, the renewed field is the one that would be made anew, and elsewhere as it was.
+    #[test]
+    fn renewed_is_as_good_as_new() {
+        let surfaces = [floor()];
+        let space = surfaces[0].regions[0].triangles.iter().map(|t| t.map(|p| p.extend(0.0))).collect();
+        let tracer = Tracer::new(space);
+        let options = MeshOptions { patch_size: PATCH, nudge: 1e-6, lift: 1e-6 };
+        let mut facets = build(&surfaces, &Grey, options);
+        let locator = FacetLocator::new(&surfaces, &facets, 2);
+        let mut patches = Patches::new(&facets, PATCH, &locator, &tracer);
+        for (k, patch) in patches.patches.iter_mut().enumerate() {
+            patch.direct = DVec3::splat(if k == 3 { 500.0 } else { 1.0 });
+            let element = &mut facets[patch.facet as usize].elements[patch.element as usize];
+            element.direct = Shading { corners: [patch.direct; 4], bulge: DVec3::ZERO };
+        }
+        let hot = HotSpots::find(&patches, &facets);
+        let new =
+            |facets: &[Facet]| RadiosityField::new(&locator, &surfaces, facets, &hot, DVec3::splat(0.9));
+        let all = |field: &RadiosityField| {
+            let number = |k: usize| u32::try_from(k).unwrap();
+            let of = |(k, patch): (usize, &FieldPatch)| {
+                (patch.corners, patch.bulge, field.excess.get(&number(k)).map(|e| (e.corners, e.bulge)))
+            };
+            field.patches.iter().enumerate().map(of).collect::<Vec<_>>()
+        };
+        let mut field = new(&facets);
+        let before = all(&field);
+        assert_eq!(field.excess.len(), 1);
+
+        let mut changed: Vec<Vec<Receiver>> = facets.iter().map(|_| Vec::new()).collect();
+        for k in [3, 4, 40] {
+            let patch = &patches.patches[k];
+            let corners = [1.0, 2.0, 3.0, 4.0].map(DVec3::splat);
+            let element = &mut facets[patch.facet as usize].elements[patch.element as usize];
+            element.indirect = Shading { corners, bulge: DVec3::ONE };
+            let receiver = Receiver { element: patch.element, contrast: 1.0, reach: 0.0, idle: 0 };
+            changed[patch.facet as usize].push(receiver);
+        }
+        field.renew(&facets, &changed);
+        let after = all(&field);
+        assert_eq!(after, all(&new(&facets)));
+        assert_eq!(after.iter().zip(&before).filter(|(a, b)| a != b).count(), 3);
+    }
+}

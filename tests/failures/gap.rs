@@ -78,3 +78,23 @@ fn a_lamp_just_below_a_ceiling() {
     let expected = EMITTED * 0.088 / (1.0 - REFLECTANCE);
     assert!((received / expected - 1.0).abs() < 0.01, "{received} not {expected}");
 }
+
+/// A plate 1 cm above the floor where all surfaces glow and reflect alike: light is the same everywhere, `M / (1 − ρ)`, and
+/// between the two it has come to and fro many times.
+#[test]
+fn light_goes_to_and_fro_in_a_gap() {
+    const REFLECTANCE: f64 = 0.8;
+    let paint = glowing_paint(REFLECTANCE, 1.0);
+    let room = flipped(&cuboid(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0)));
+    let plate = cuboid(v(-0.3, -0.3, 0.01), v(0.3, 0.3, 0.03));
+    let baked = Model::new().add(&paint, &room).add(&paint, &plate).bake(&by_light(64));
+    let expected = 1.0 / (1.0 - REFLECTANCE);
+    for (x, y) in [(0.0, 0.0), (0.1, 0.17), (-0.25, 0.05), (0.6, 0.1)] {
+        let floor = baked.at(v(x, y, 0.0), DVec3::Z);
+        assert!((floor / expected - 1.0).abs() < 0.02, "{floor} not {expected} on the floor at {x} {y}");
+    }
+    for (x, y) in [(0.0, 0.0), (0.1, 0.17), (-0.25, 0.05)] {
+        let under = baked.at(v(x, y, 0.01), -DVec3::Z);
+        assert!((under / expected - 1.0).abs() < 0.02, "{under} not {expected} under the plate at {x} {y}");
+    }
+}
