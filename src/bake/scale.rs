@@ -13,7 +13,7 @@ const PATCHES: f64 = 500.0;
 const UTILISATION: f64 = 0.6;
 
 /// With direct light evaluated in texels, elements need not follow its shadows closer than this many texels.
-const TEXELS_AN_ELEMENT: f64 = 3.0;
+const TEXELS_AN_ELEMENT: f64 = 2.5;
 
 /// Patches have no shorter sides than this many texels.
 const TEXELS_A_PATCH: f64 = 4.0;
