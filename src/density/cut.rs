@@ -31,6 +31,7 @@ const CHART: f64 = 12.0;
 
 /// Spacings that are tried within a halving.
 const STEPS: usize = 2;
+const SPACINGS: usize = STEPS * LEVELS;
 
 /// Trees are cut as would pay at this fraction of the expected price.
 const SPARE: f64 = 0.2;
@@ -38,6 +39,9 @@ const SPARE: f64 = 0.2;
 /// No texel is longer than this many times its width: along an edge that is all but parallel to an axis light
 /// is not quite even.
 const MOST_SLENDER: f64 = 16.0;
+
+/// Rectangles of more cells than this are cut side by side.
+const PARALLEL_CELLS: usize = 256;
 
 /// Searches for the price that fills the page.
 const TRIES: u32 = 30;
@@ -189,7 +193,7 @@ struct Cutter<'a> {
     price: f64,
     options: DensityOptions,
     /// The spacings that are tried, for either axis, metres.
-    spacings: [[f64; STEPS * LEVELS]; 2],
+    spacings: [[f64; SPACINGS]; 2],
 }
 
 impl<'a> Cutter<'a> {
@@ -218,8 +222,14 @@ impl<'a> Cutter<'a> {
         let side =
             |keep: &dyn Fn(&Cell) -> bool| cells.iter().filter(|c| keep(c)).copied().collect::<Vec<_>>();
         let (low, high) = (side(&|c| c.min[axis] < at), side(&|c| c.max[axis] > at));
-        let low = self.grow((min, low_max), &low, depth - 1);
-        tree.cut = Some(Box::new([low, self.grow((high_min, max), &high, depth - 1)]));
+        let grow_low = || self.grow((min, low_max), &low, depth - 1);
+        let grow_high = || self.grow((high_min, max), &high, depth - 1);
+        let (low, high) = if cells.len() > PARALLEL_CELLS {
+            rayon::join(grow_low, grow_high)
+        } else {
+            (grow_low(), grow_high())
+        };
+        tree.cut = Some(Box::new([low, high]));
         tree
     }
 
@@ -298,27 +308,27 @@ impl<'a> Cutter<'a> {
 
     /// A rectangle as one part, at its best spacing.
     fn leaf(&self, (min, max): (DVec2, DVec2), sum: &Sum) -> Leaf {
-        const LAST: usize = STEPS * LEVELS - 1;
+        const LAST: usize = SPACINGS - 1;
         let none = Leaf { min, max, spacing: max - min, count: DVec2::ONE, texels: 0.0, cost: 0.0 };
         let extent = sum.max - sum.min;
         if !extent.is_finite() || extent.min_element() <= 0.0 {
             return none;
         }
-        let error = [0, 1].map(|axis| sum.errors(axis));
-        let texels: [[f64; STEPS * LEVELS]; 2] = [0, 1].map(|axis| {
-            // As `round`, which is slow where the processor is not known to have it.
-            std::array::from_fn(|step| {
-                f64::from((extent[axis] / self.spacings[axis][step] + 0.5) as u32).max(1.0)
-            })
-        });
-        // No spacing is wider than the part, none narrower than was looked at (an edge that seemed to run along
-        // an axis may not), and none so narrow that the chart is longer than the page.
-        let first =
-            [0, 1].map(|axis| self.spacings[axis].partition_point(|&s| s > 1.5 * extent[axis]).min(LAST));
-        let last = [0, 1].map(|axis| {
+        let (mut error, mut texels) = ([[0.0; SPACINGS]; 2], [[0.0; SPACINGS]; 2]);
+        let (mut first, mut last) = ([0; 2], [0; 2]);
+        for axis in 0..2 {
+            let spacings = &self.spacings[axis];
+            sum.errors(axis, &mut error[axis]);
+            for (texels, spacing) in texels[axis].iter_mut().zip(spacings) {
+                // As `round`, which is slow where the processor is not known to have it.
+                *texels = f64::from((extent[axis] / spacing + 0.5) as u32).max(1.0);
+            }
+            // No spacing is wider than the part, none narrower than was looked at (an edge that seemed to run along
+            // an axis may not), and none so narrow that the chart is longer than the page.
+            first[axis] = spacings.partition_point(|&s| s > 1.5 * extent[axis]).min(LAST);
             let longest = texels[axis].partition_point(|&t| t <= self.options.longest).saturating_sub(1);
-            longest.min(STEPS * sum.levels[axis]).clamp(first[axis], LAST)
-        });
+            last[axis] = longest.min(STEPS * sum.levels[axis]).clamp(first[axis], LAST);
+        }
         let cost = |[x, y]: [usize; 2]| {
             let (width, height) = (self.spacings[0][x], self.spacings[1][y]);
             let is_slender = (x < last[0] && width > MOST_SLENDER * height)
@@ -334,14 +344,17 @@ impl<'a> Cutter<'a> {
             if cost < best.0 { (cost, step) } else { best }
         };
         let mut best = (f64::INFINITY, first);
-        for k in 0..=LAST {
+        for k in 0..=(last[0] - first[0]).max(last[1] - first[1]) {
             best = least(best, [(first[0] + k).min(last[0]), (first[1] + k).min(last[1])]);
         }
         for _ in 0..2 {
-            let y = best.1[1];
+            let [before, y] = best.1;
             best = (first[0]..=last[0]).fold(best, |best, x| least(best, [x, y]));
             let x = best.1[0];
             best = (first[1]..=last[1]).fold(best, |best, y| least(best, [x, y]));
+            if best.1 == [before, y] {
+                break;
+            }
         }
         let (cost, step) = best;
         let count = DVec2::new(texels[0][step[0]], texels[1][step[1]]);
@@ -459,16 +472,14 @@ impl Sum {
     }
 
     /// The error along an axis at each of the spacings that are tried: all that finer halvings would change.
-    fn errors(&self, axis: usize) -> [f64; STEPS * LEVELS] {
+    fn errors(&self, axis: usize, errors: &mut [f64; SPACINGS]) {
         let mut finer = 0.0;
-        let mut errors = [0.0; STEPS * LEVELS];
-        for level in (0..LEVELS).rev() {
+        for (errors, energy) in errors.chunks_exact_mut(STEPS).zip(&self.energy[axis]).rev() {
             let before = finer;
-            finer += self.energy[axis][level];
+            finer += energy;
             // Half way between two halvings lies the geometric mean.
-            errors[STEPS * level] = finer;
-            errors[STEPS * level + 1] = (finer * before.max(0.25 * finer)).sqrt();
+            errors[0] = finer;
+            errors[1] = (finer * before.max(0.25 * finer)).sqrt();
         }
-        errors
     }
 }
