@@ -31,6 +31,8 @@ const CHART: f64 = 12.0;
 
 /// Spacings that are tried within a halving.
 const STEPS: usize = 2;
+
+/// Spacings that are tried in all.
 const SPACINGS: usize = STEPS * LEVELS;
 
 /// Trees are cut as would pay at this fraction of the expected price.
@@ -188,6 +190,17 @@ impl Tree {
     }
 }
 
+/// The spacings of a rectangle along one axis.
+struct Choices {
+    /// The error at each,
+    error: [f64; SPACINGS],
+    /// and the texels that it takes.
+    texels: [f64; SPACINGS],
+    /// The widest and the narrowest that may be.
+    first: usize,
+    last: usize,
+}
+
 struct Cutter<'a> {
     survey: &'a SurfaceSurvey,
     price: f64,
@@ -308,57 +321,60 @@ impl<'a> Cutter<'a> {
 
     /// A rectangle as one part, at its best spacing.
     fn leaf(&self, (min, max): (DVec2, DVec2), sum: &Sum) -> Leaf {
-        const LAST: usize = SPACINGS - 1;
         let none = Leaf { min, max, spacing: max - min, count: DVec2::ONE, texels: 0.0, cost: 0.0 };
         let extent = sum.max - sum.min;
         if !extent.is_finite() || extent.min_element() <= 0.0 {
             return none;
         }
-        let (mut error, mut texels) = ([[0.0; SPACINGS]; 2], [[0.0; SPACINGS]; 2]);
-        let (mut first, mut last) = ([0; 2], [0; 2]);
-        for axis in 0..2 {
-            let spacings = &self.spacings[axis];
-            sum.errors(axis, &mut error[axis]);
-            for (texels, spacing) in texels[axis].iter_mut().zip(spacings) {
-                // As `round`, which is slow where the processor is not known to have it.
-                *texels = f64::from((extent[axis] / spacing + 0.5) as u32).max(1.0);
-            }
-            // No spacing is wider than the part, none narrower than was looked at (an edge that seemed to run along
-            // an axis may not), and none so narrow that the chart is longer than the page.
-            first[axis] = spacings.partition_point(|&s| s > 1.5 * extent[axis]).min(LAST);
-            let longest = texels[axis].partition_point(|&t| t <= self.options.longest).saturating_sub(1);
-            last[axis] = longest.min(STEPS * sum.levels[axis]).clamp(first[axis], LAST);
-        }
+        let [across, down] = [self.choices(0, extent.x, sum), self.choices(1, extent.y, sum)];
         let cost = |[x, y]: [usize; 2]| {
             let (width, height) = (self.spacings[0][x], self.spacings[1][y]);
-            let is_slender = (x < last[0] && width > MOST_SLENDER * height)
-                || (y < last[1] && height > MOST_SLENDER * width);
+            let is_slender = (x < across.last && width > MOST_SLENDER * height)
+                || (y < down.last && height > MOST_SLENDER * width);
             if is_slender {
                 return f64::INFINITY;
             }
-            let chart = self.chart_texels([texels[0][x], texels[1][y]]);
-            error[0][x] + error[1][y] + self.price * (CHART + chart)
+            let chart = self.chart_texels([across.texels[x], down.texels[y]]);
+            across.error[x] + down.error[y] + self.price * (CHART + chart)
         };
         let least = |best: (f64, [usize; 2]), step: [usize; 2]| {
             let cost = cost(step);
             if cost < best.0 { (cost, step) } else { best }
         };
-        let mut best = (f64::INFINITY, first);
-        for k in 0..=(last[0] - first[0]).max(last[1] - first[1]) {
-            best = least(best, [(first[0] + k).min(last[0]), (first[1] + k).min(last[1])]);
+        let mut best = (f64::INFINITY, [across.first, down.first]);
+        for k in 0..=(across.last - across.first).max(down.last - down.first) {
+            best = least(best, [(across.first + k).min(across.last), (down.first + k).min(down.last)]);
         }
         for _ in 0..2 {
-            let [before, y] = best.1;
-            best = (first[0]..=last[0]).fold(best, |best, x| least(best, [x, y]));
+            let before = best.1;
+            let y = before[1];
+            best = (across.first..=across.last).fold(best, |best, x| least(best, [x, y]));
             let x = best.1[0];
-            best = (first[1]..=last[1]).fold(best, |best, y| least(best, [x, y]));
-            if best.1 == [before, y] {
+            best = (down.first..=down.last).fold(best, |best, y| least(best, [x, y]));
+            if best.1 == before {
                 break;
             }
         }
         let (cost, step) = best;
-        let count = DVec2::new(texels[0][step[0]], texels[1][step[1]]);
+        let count = DVec2::new(across.texels[step[0]], down.texels[step[1]]);
         Leaf { min, max, spacing: extent / count, count, texels: self.chart_texels(count.to_array()), cost }
+    }
+
+    /// The spacings that a rectangle so long along an axis, metres, may have.
+    fn choices(&self, axis: usize, extent: f64, sum: &Sum) -> Choices {
+        const LAST: usize = SPACINGS - 1;
+        let spacings = &self.spacings[axis];
+        let mut texels = [0.0; SPACINGS];
+        for (texels, spacing) in texels.iter_mut().zip(spacings) {
+            // As `round`, which is slow where the processor is not known to have it.
+            *texels = f64::from((extent / spacing + 0.5) as u32).max(1.0);
+        }
+        // No spacing is wider than the part, none narrower than was looked at (an edge that seemed to run along
+        // an axis may not), and none so narrow that the chart is longer than the page.
+        let first = spacings.partition_point(|&s| s > 1.5 * extent).min(LAST);
+        let longest = texels.partition_point(|&t| t <= self.options.longest).saturating_sub(1);
+        let last = longest.min(STEPS * sum.levels[axis]).clamp(first, LAST);
+        Choices { error: sum.errors(axis), texels, first, last }
     }
 
     /// Texels that a chart takes with the gap beside it.
@@ -472,8 +488,9 @@ impl Sum {
     }
 
     /// The error along an axis at each of the spacings that are tried: all that finer halvings would change.
-    fn errors(&self, axis: usize, errors: &mut [f64; SPACINGS]) {
+    fn errors(&self, axis: usize) -> [f64; SPACINGS] {
         let mut finer = 0.0;
+        let mut errors = [0.0; SPACINGS];
         for (errors, energy) in errors.chunks_exact_mut(STEPS).zip(&self.energy[axis]).rev() {
             let before = finer;
             finer += energy;
@@ -481,5 +498,6 @@ impl Sum {
             errors[0] = finer;
             errors[1] = (finer * before.max(0.25 * finer)).sqrt();
         }
+        errors
     }
 }
